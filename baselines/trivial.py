@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from baselines.core.controller import Array, Prediction, RowController, encode_actions, row_count
-from baselines.core.entry import Entry
-from baselines.core.environments import ELBOW, KNEE, POSITIONING
+from baselines.core.entry import Entry, Spec
+from baselines.core.environments import ELBOW, JOINT, KNEE, POSITIONING
+from baselines.joint.view import make_joint_signal_map
 from baselines.knee.published import NOMINAL_PRESSURE
-from pam_envs.parameters import Signal, Signals
+from pam_envs.parameters import Signal
+
+Writer = Callable[[Array, ArrayLike], NDArray[np.float32]]
+"""From SI values, shape (n_signals, n_env), and the observation to the action."""
 
 
 @dataclass(frozen=True)
 class Constant(RowController):
-    """Constant action.
+    """Constant SI values, clipped to the ranges of the signals."""
 
-    Attributes
-    ----------
-    signals : sequence of Signal
-        All signals of the action.
-    values : sequence of float
-        In SI; clipped to the ranges of the signals.
-    """
-
-    signals: Sequence[Signal]
+    write: Writer
     values: Sequence[float]
 
-    def initial_state(self, observation: ArrayLike) -> None:
-        """Return no state."""
-
     def respond(self, observation: ArrayLike, state: Any) -> Prediction:
-        """See :class:`~baselines.core.controller.RowController`."""
+        """Return the action and no state."""
         values = np.repeat(np.array(self.values)[:, None], row_count(observation), axis=1)
-        return encode_actions(self.signals, values, observation), None
+        return self.write(values, observation), None
 
 
 class RandomState(NamedTuple):
@@ -52,16 +47,11 @@ class Random(RowController):
 
     Draw ``k`` of row ``i`` is a function of seed, signal, ``i`` and ``k`` alone: the same calls
     give the same actions, and row ``i`` of a batch does not depend on the others.
-
-    Attributes
-    ----------
-    signals : sequence of Signal
-        Signals to draw.
-    seed : int
     """
 
+    write: Writer
     signals: Sequence[Signal]
-    seed: int = 0
+    seed: int
 
     def initial_state(self, observation: ArrayLike) -> RandomState:
         """Return the state before the first draw."""
@@ -69,17 +59,12 @@ class Random(RowController):
 
     def respond(self, observation: ArrayLike, state: RandomState) -> Prediction:
         """Return the action of the next draw, and the state after it."""
-        values, after = self.draw(state)
-        return encode_actions(self.signals, values, observation), after
-
-    def draw(self, state: RandomState) -> tuple[Array, RandomState]:
-        """Return SI values, shape (n_signals, n_env), and the next state."""
         row, values = np.arange(len(state.draw), dtype=np.uint64), []
         for k, signal in enumerate(self.signals):
             seed = np.uint64((self.seed * len(self.signals) + k) % 2**32)
             share = _uniform(seed, row, state.draw)
             values.append(signal.low + (signal.high - signal.low) * share)
-        return np.array(values), RandomState(state.draw + np.uint64(1))
+        return self.write(np.array(values), observation), RandomState(state.draw + np.uint64(1))
 
 
 def _uniform(seed: np.uint64, row: NDArray[np.uint64], draw: NDArray[np.uint64]) -> Array:
@@ -93,37 +78,52 @@ def _uniform(seed: np.uint64, row: NDArray[np.uint64], draw: NDArray[np.uint64])
     return np.asarray((z >> np.uint64(11)) * 2.0**-53)
 
 
-def make_zero(_plant: Any, _signals: Signals, action_signals: Signals) -> Constant:
-    """Return the controller with pressures of 0 Pa, and on/off exhausts open."""
-    return Constant(tuple(action_signals), tuple(s.low for s in action_signals))
+def _signals(spec: Spec[Any], joints: bool) -> tuple[Writer, tuple[Signal, ...]]:
+    """Return all signals, or the set-points of joints alone: a co-contraction is kept."""
+    if not joints:
+        return partial(encode_actions, tuple(spec.actions)), tuple(spec.actions)
+    angles = make_joint_signal_map(spec.signals, spec.actions)
+    return (lambda values, observation: angles.write(values.T, observation)), angles.actions
 
 
-def make_constant_pressure(_plant: Any, _signals: Signals, action_signals: Signals) -> Constant:
-    """Return the controller with the nominal pressure of the knee orthosis."""
-    return Constant((action_signals["pressure_set_point"],), (NOMINAL_PRESSURE,))
+def make_constant(spec: Spec[Any], value: float = -math.inf, joints: bool = False) -> Constant:
+    """Return the controller with a value of all signals, by default their lowest."""
+    write, signals = _signals(spec, joints)
+    return Constant(write, (value,) * len(signals))
 
 
-def make_random(_plant: Any, _signals: Signals, action_signals: Signals, seed: int = 0) -> Random:
-    """Return the controller that draws all signals of the action."""
-    return Random(tuple(action_signals), seed)
+def make_random(spec: Spec[Any], joints: bool = False) -> Random:
+    """Return the controller that draws all signals, or the set-points of joints."""
+    return Random(*_signals(spec, joints), spec.seed)
 
 
+TRIVIAL = partial(Entry, knowledge="nothing")
 ENTRIES = {
-    "zero": Entry("constant pressure of 0", "nothing", make_zero, envs=(*POSITIONING, *KNEE)),
-    "random": Entry(
+    "zero": TRIVIAL("constant pressure of 0", make=make_constant, envs=(*POSITIONING, *KNEE)),
+    "random": TRIVIAL(
         "uniformly distributed set-points, seeded",
-        "nothing",
-        make_random,
+        make=make_random,
         envs=(*POSITIONING, *KNEE),
         seeded=True,
     ),
-    "knee_hold": Entry(
-        "constant nominal pressure of 2 bar", "nothing", make_constant_pressure, envs=KNEE
+    "knee_hold": TRIVIAL(
+        "constant nominal pressure of 2 bar",
+        make=partial(make_constant, value=NOMINAL_PRESSURE),
+        envs=KNEE,
     ),
-    "elbow_limp": Entry(
-        "constant pressure of 0; on/off exhaust valves open", "nothing", make_zero, envs=ELBOW
+    "elbow_limp": TRIVIAL(
+        "constant pressure of 0; on/off exhaust valves open", make=make_constant, envs=ELBOW
     ),
-    "elbow_random": Entry(
-        "uniformly distributed commands, seeded", "nothing", make_random, envs=ELBOW, seeded=True
+    "elbow_random": TRIVIAL(
+        "uniformly distributed commands, seeded", make=make_random, envs=ELBOW, seeded=True
+    ),
+    "joint_straight": TRIVIAL(
+        "set-points of 0", make=partial(make_constant, value=0.0, joints=True), envs=JOINT
+    ),
+    "joint_random": TRIVIAL(
+        "uniformly distributed set-points, seeded",
+        make=partial(make_random, joints=True),
+        envs=JOINT,
+        seeded=True,
     ),
 }

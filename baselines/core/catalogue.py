@@ -28,7 +28,7 @@ from typing import Any
 import baselines
 from baselines.core import tuned
 from baselines.core.controller import Controller
-from baselines.core.entry import Entry
+from baselines.core.entry import Entry, Spec
 from baselines.core.knobs import AS_DESIGNED, Knobs, check_knobs
 from pam_envs.parameters import Signals
 
@@ -94,12 +94,8 @@ def make_controller(
         One of ``CONTROLLERS``.
     plant : Plant
         Nominal plant; not used by controllers with knowledge "nothing" or "tables".
-    signals, action_signals : Signals
-        Those of the environment.
-    seed : int
-        For controllers that draw random numbers.
-    knobs : mapping of float
-        Factors on the knobs of the entry; 1 where left out.
+    signals, action_signals, seed, knobs
+        See :class:`~baselines.core.entry.Spec`.
 
     Raises
     ------
@@ -117,10 +113,8 @@ def make_controller(
             f"plant is a {type(plant).__name__}; choose a controller whose envs name the "
             "environment"
         )
-    options: dict[str, Any] = {"knobs": knobs} if knobs else {}
-    if entry.seeded:
-        options["seed"] = seed
-    made: Controller = entry.make(plant, signals, action_signals, **options)
+    factors = {**entry.found, **knobs}
+    made: Controller = entry.make(Spec(plant, signals, action_signals, factors, seed))
     return made
 
 

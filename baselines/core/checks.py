@@ -46,8 +46,7 @@ def check_controller(
 
 
 def _check_form(controller: Controller, seen: Any, action_signals: Signals) -> None:
-    low, high = np.array([[signal.encode(v) for v in (signal.low, signal.high)]
-                          for signal in action_signals]).T  # fmt: skip
+    low, high = np.array([(s.encode(s.low), s.encode(s.high)) for s in action_signals]).T
     for sequence in (seen, seen[:, 0]):
         state = None
         for observation in sequence:

@@ -63,9 +63,9 @@ class RowController(ABC):
     response to an observation.
     """
 
-    @abstractmethod
     def initial_state(self, observation: ArrayLike) -> Any:
-        """Return the state of all rows at the start of an episode; None without state."""
+        """Return the state of all rows at the start of an episode; by default none."""
+        return None
 
     @abstractmethod
     def respond(self, observation: ArrayLike, state: Any) -> Prediction:
@@ -120,6 +120,19 @@ def preview_names(name: str, signals: Signals) -> list[str]:
     return names
 
 
+def preview_weights(times: Sequence[float], lead: float, extrapolation: float = 0.0) -> Array:
+    """Return the weights of samples at times [s], the first at 0, for the value at a lead [s].
+
+    Linear interpolation; beyond the last sample the line from the first to the last one is
+    extended, by at most ``extrapolation`` times the preview horizon. The weights add up to 1.
+    """
+    weights = np.array([np.interp(lead, times, sample) for sample in np.eye(len(times))])
+    if lead > times[-1] > 0.0:
+        beyond = min(lead / times[-1] - 1.0, extrapolation)
+        weights[[0, -1]] = -beyond, 1.0 + beyond
+    return weights
+
+
 def row_count(observation: ArrayLike) -> int:
     """Return the number of rows of an observation: 1 for a single one."""
     return 1 if np.ndim(observation) == 1 else len(np.asarray(observation))
@@ -133,16 +146,9 @@ def encode_action(signal: Signal, value: Array, observation: ArrayLike) -> NDArr
 def encode_actions(
     signals: Sequence[Signal], values: ArrayLike, observation: ArrayLike
 ) -> NDArray[np.float32]:
-    """Return the action for SI values of several signals, clipped to their ranges.
+    """Return the action for SI values, shape (n_act, n_env), clipped to their ranges.
 
-    Parameters
-    ----------
-    signals : sequence of Signal
-        All signals of the action.
-    values : array_like, shape (n_act, n_env)
-        In the order of ``signals``.
-    observation : array_like, shape (n_obs,) or (n_env, n_obs)
-        Determines the form of the action.
+    ``signals`` are all signals of the action; the observation determines its form.
     """
     values = np.asarray(values)
     action = np.empty(values.shape[::-1], np.float32)
@@ -156,17 +162,7 @@ def encode_actions(
 def reset_rows(
     state: S | None, episode_start: ArrayLike | None, rows: int, initial: Callable[[], S]
 ) -> S:
-    """Return the state with initial values in the rows that start an episode.
-
-    Parameters
-    ----------
-    state : tuple or None
-        As passed to ``predict``.
-    episode_start : array_like of bool, shape (rows,), optional
-    rows : int
-    initial : callable
-        Returns the initial state of all rows; called only if a row starts.
-    """
+    """Return the state with initial values, of all rows, in those that start an episode."""
     if state is None:
         return initial()
     if episode_start is None:

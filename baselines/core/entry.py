@@ -1,18 +1,47 @@
-"""Entry of a controller in the catalogue: description, environments, knobs and maker."""
+"""Entry of a controller in the catalogue, and the specification that it is designed from."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Generic, Literal, TypeVar
 
 from baselines.core.environments import POSITIONING
 from baselines.core.knobs import Bounds, Knobs
+from pam_envs.parameters import Signals
 
+P = TypeVar("P")
 Knowledge = Literal["nothing", "tables", "nominal model", "true model"]
-Maker = Callable[..., Any]
-"""``make(plant, signals, action_signals, **options)``; options are ``knobs`` and ``seed``, each
-passed only to controllers whose entry declares it."""
+
+
+@dataclass(frozen=True)
+class Spec(Generic[P]):
+    """Specification from which a maker designs a controller.
+
+    Attributes
+    ----------
+    plant : Plant
+        Nominal plant.
+    signals, actions : Signals
+        Those of the environment.
+    knobs : mapping of float
+        Factors on the knobs of the entry; 1 where left out.
+    seed : int
+        For controllers that draw random numbers.
+    """
+
+    plant: P
+    signals: Signals
+    actions: Signals
+    knobs: Knobs = field(default_factory=dict)
+    seed: int = 0
+
+    def knob(self, name: str) -> float:
+        """Return a knob's factor, 1 if it is not set."""
+        return self.knobs.get(name, 1.0)
+
+
+Maker = Callable[[Spec[Any]], Any]
 
 
 @dataclass(frozen=True)
@@ -26,7 +55,7 @@ class Entry:
     knowledge : {"nothing", "tables", "nominal model", "true model"}
         Model knowledge; see :mod:`baselines.core.catalogue` on the last two.
     make : callable
-        From nominal plant, signals and action signals to the controller; see :data:`Maker`.
+        From a :class:`Spec` to the controller.
     preview : bool
         Whether the controller reads the previewed reference samples.
     feedback : bool
@@ -38,7 +67,7 @@ class Entry:
     plants : tuple of type
         Classes of nominal plants that the maker accepts; empty if the plant is not used.
     seeded : bool
-        Whether the maker takes a random seed.
+        Whether the controller draws random numbers.
     kind : str
         "classical": a row of results is verified by running it again.
     tuning : str

@@ -3,7 +3,7 @@
 A rule or a paper fixes most numbers of a controller from the nominal plant, and leaves some open:
 the bandwidth of the closed loop, the lead of the preview. A knob is a factor on one of them; 1 is
 the number as published or by the rule, to the last bit. An entry of the catalogue declares its
-knobs with their bounds (``Entry.knobs``); makers take them as ``knobs``.
+knobs with their bounds (``Entry.knobs``); makers read them by ``Spec.knob``.
 """
 
 from __future__ import annotations
@@ -18,19 +18,8 @@ Bounds = Mapping[str, tuple[float, float]]
 AS_DESIGNED: Knobs = MappingProxyType({})
 
 
-def knob(knobs: Knobs, name: str) -> float:
-    """Return a knob's factor, 1 if it is not set."""
-    return knobs.get(name, 1.0)
-
-
 def check_knobs(controller: str, bounds: Bounds, knobs: Knobs) -> None:
-    """Raise unless a controller has these knobs and every factor is within its bounds.
-
-    Raises
-    ------
-    ValueError
-        Naming the knob, its value and the allowed range.
-    """
+    """Raise unless a controller has these knobs and every factor is within its bounds."""
     for name, value in knobs.items():
         if name not in bounds:
             there = f"choose from {', '.join(bounds)}" if bounds else "it has none: leave knobs out"

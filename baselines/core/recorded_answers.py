@@ -38,10 +38,7 @@ class RecordedAnswers:
         return float(np.abs(np.diff(self.answers, axis=0)).sum())
 
     def deviation(self, controller: Any) -> float:
-        """Return the largest absolute deviation of a controller's answers from the recorded ones.
-
-        It is infinite where the shapes differ or an answer is not finite.
-        """
+        """Return the largest deviation of a controller's answers; infinite if not comparable."""
         now = answers(controller, self.observations)
         if now.shape != self.answers.shape or not np.isfinite(now).all():
             return math.inf
@@ -55,13 +52,7 @@ class RecordedAnswers:
     def from_dict(
         cls, record: Mapping[str, Any], n_signals: int, n_actions: int
     ) -> RecordedAnswers:
-        """Return the record that :meth:`as_dict` wrote.
-
-        Raises
-        ------
-        ValueError, KeyError, TypeError
-            If the mapping does not hold one.
-        """
+        """Return the record that :meth:`as_dict` wrote."""
         made = cls(_array(record["observations"], n_signals), _array(record["answers"], n_actions))
         if not 0 < len(made.observations) == len(made.answers):
             raise ValueError("the record needs as many answers as observations")
@@ -69,13 +60,7 @@ class RecordedAnswers:
 
 
 def answers(controller: Any, observations: Array) -> Array:
-    """Return the actions of a controller for an episode's observations, shape (steps, n_actions).
-
-    Parameters
-    ----------
-    controller : Controller
-    observations : array, shape (steps, n_signals)
-    """
+    """Return the actions, (steps, n_actions), of a controller for an episode's observations."""
     made, state = [], None
     for step, observation in enumerate(observations):
         action, state = controller.predict(observation, state, step == 0)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,16 +24,10 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Tuned:
-    """Result of a search over the knobs of a controller in an environment.
+    """Result of a search over the knobs of a published controller in an environment.
 
     Attributes
     ----------
-    controller : str
-        Name of the controller as published.
-    env : str
-        Id of the environment.
-    knobs : mapping of float
-        Factors; see :mod:`baselines.core.knobs`.
     trials, seed : int
         Number of settings tried, and seed of the search.
     before, after : float
@@ -59,30 +52,24 @@ class Tuned:
 
 
 def tuned_name(controller: str, env: str) -> str:
-    """Return the name of a controller with knobs tuned in an environment."""
+    """Return the name in the catalogue of a controller tuned in an environment."""
     return "_".join(word for word in (controller, "tuned", SUFFIXES.get(env, "")) if word)
 
 
 def read(file: Path = FILE) -> dict[str, Tuned]:
-    """Return the results of searches by their names in the catalogue.
-
-    Raises
-    ------
-    ValueError
-        If the file does not have the layout that a search writes.
-    """
+    """Return the results of searches by their names in the catalogue."""
     content = yaml.safe_load(file.read_text(encoding="utf-8"))
     if not isinstance(content, dict) or content.get("schema") != SCHEMA:
         raise ValueError(
             f"{file.name} is not of schema {SCHEMA}; restore the file of the last commit, and add "
             "to it with `python -m benchmarks tune`"
         )
-    return {name: _read(name, said) for name, said in (content.get("tuned") or {}).items()}
+    return {name: _read(name, record) for name, record in (content.get("tuned") or {}).items()}
 
 
-def _read(name: str, said: Mapping[str, Any]) -> Tuned:
+def _read(name: str, record: Mapping[str, Any]) -> Tuned:
     try:
-        made = Tuned(**said)
+        made = Tuned(**record)
     except TypeError as error:
         raise ValueError(
             f"{FILE.name}: {name}: {error}; search again, or remove the entry"
@@ -95,36 +82,23 @@ def _read(name: str, said: Mapping[str, Any]) -> Tuned:
 
 
 def entries(plain: Mapping[str, Entry], found: Mapping[str, Tuned]) -> dict[str, Entry]:
-    """Return the catalogue entries of tuned controllers.
-
-    Parameters
-    ----------
-    plain : mapping of Entry
-        The controllers as published.
-    found : mapping of Tuned
-
-    Raises
-    ------
-    ValueError
-        If there is no such controller in that environment, or a knob is out of its bounds.
-    """
-    return {name: _as_entry(name, plain, made) for name, made in found.items()}
-
-
-def _as_entry(name: str, plain: Mapping[str, Entry], made: Tuned) -> Entry:
-    base = plain.get(made.controller)
-    if base is None or made.env not in base.envs:
-        raise ValueError(
-            f"{name}: no controller {made.controller!r} in {made.env}; remove it from {FILE.name}"
+    """Return the catalogue entries of tuned controllers; ``plain`` holds them as published."""
+    entries: dict[str, Entry] = {}
+    for name, made in found.items():
+        base = plain.get(made.controller)
+        if base is None or made.env not in base.envs:
+            raise ValueError(
+                f"{name}: no controller {made.controller!r} in {made.env}; remove it from"
+                f" {FILE.name}"
+            )
+        check_knobs(made.controller, base.knobs, made.knobs)
+        entries[name] = replace(
+            base,
+            summary=f"{made.controller} with {', '.join(made.knobs)} as found by a search",
+            envs=(made.env,),
+            tuning=f"Optuna TPE, {made.trials} trials on tuning seeds",
+            trials=made.trials,
+            knobs={},
+            found=made.knobs,
         )
-    check_knobs(made.controller, base.knobs, made.knobs)
-    return replace(
-        base,
-        summary=f"{made.controller} with {', '.join(made.knobs)} as found by a search",
-        make=partial(base.make, knobs=made.knobs),
-        envs=(made.env,),
-        tuning=f"Optuna TPE, {made.trials} trials on tuning seeds",
-        trials=made.trials,
-        knobs={},
-        found=made.knobs,
-    )
+    return entries

@@ -21,16 +21,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Prediction, RowController
-from baselines.core.entry import Entry
-from baselines.core.environments import ELBOW
-from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
-from baselines.elbow.friction import ElbowFriction, make_elbow_friction
+from baselines.core.entry import Spec
+from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
+from baselines.elbow.nominal import ElbowFriction, make_elbow_friction
 from baselines.elbow.valves import PressureLoop, make_pressure_loop
-from baselines.elbow.view import ElbowSignalMap, make_elbow_signal_map
-from baselines.linear.simc import PI_KNOBS, simc_rule
-from baselines.positioning.nominal import HysteresisState
-from baselines.positioning.pid import Gains, PidState, pid_start, pid_step
-from pam_envs.parameters import Signals
+from baselines.elbow.view import ELBOW_ENTRY, ElbowSignalMap, make_elbow_signal_map
+from baselines.linear.pid import PI_KNOBS, Gains, PidState, pid_start, pid_step, simc_rule
+from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 SHARE = 0.2
@@ -48,109 +45,61 @@ def simc_torque(plant: ElbowOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
     step = plant.cycle if pulsed else plant.control_period
     tau = step if pulsed else plant.regulator.time_constant
     theta = 0.5 * step + plant.control_period
-    gain, reset, _ = simc_rule(steepest, tau, 0.0, theta, knobs=knobs)
-    return Gains(
-        proportional=gain,
-        integral=gain / reset,
-        derivative=0.0,
-        filter_time=plant.control_period,
-        tracking_time=reset,
-    )
+    return simc_rule(steepest, tau, 0.0, theta, knobs=knobs).parallel(plant.control_period)
 
 
 class ElbowPidState(NamedTuple):
     """States of the PI and of the nominal hysteresis, first axis n_env."""
 
     pid: PidState
-    hysteresis: HysteresisState
+    hysteresis: RowsState
 
 
 @dataclass(frozen=True)
 class ElbowPid(RowController):
-    """PI of the estimated torque; see the module.
+    """PI of the estimated torque, friction included; see the module.
 
-    Attributes
-    ----------
-    gains : Gains
-    signals : ElbowSignalMap
-    loop : PressureLoop or None
-        Of on/off valves; regulators contain their own.
-    middle, full : float
-        Common pressure [Pa], and the largest.
-    period : float
-        Control period [s].
-    friction : ElbowFriction
-        Added to the estimate.
+    The loop is that of on/off valves; regulators contain their own. ``middle`` is the common
+    pressure [Pa].
     """
 
     gains: Gains
     signals: ElbowSignalMap
     loop: PressureLoop | None
     middle: float
-    full: float
-    period: float
     friction: ElbowFriction
 
     def initial_state(self, observation: ArrayLike) -> ElbowPidState:
-        """See :class:`~baselines.core.controller.RowController`."""
+        """Return the state that holds the present difference of pressures."""
         view = self.signals.read(observation)
         pid = pid_start(0.5 * np.diff(view.pressure, axis=0)[0], view.torque)
-        return ElbowPidState(pid, self.friction.initial(len(view.angle)))
+        return ElbowPidState(pid, self.friction.hysteresis.initial(len(view.angle)))
 
     def respond(self, observation: ArrayLike, state: ElbowPidState) -> Prediction:
-        """See :class:`~baselines.core.controller.RowController`."""
-        view = self.signals.read(observation)
+        """Return the action and the next state."""
+        view, full = self.signals.read(observation), self.friction.plant.full_pressure
         losses, hysteresis = self.friction.losses(view, state.hysteresis)
-        torque, full = view.torque + self.friction.torque(view, losses), self.full
-        error = view.torque_reference - torque
-        shift, after = pid_step(self.gains, state.pid, error, torque, -full, full, self.period)
+        torque = view.torque + self.friction.torque(view, losses)
+        error, period = view.torque_reference - torque, self.signals.period
+        shift, after = pid_step(self.gains, state.pid, error, torque, -full, full, period)
         target = np.clip(self.middle + np.array([-shift, shift]), 0.0, full)
         commands = target if self.loop is None else self.loop.commands(view, target)
         return self.signals.write(commands, observation), ElbowPidState(after, hysteresis)
 
 
-def make_elbow_pid(
-    plant: ElbowOrthosis,
-    signals: Signals,
-    action_signals: Signals,
-    gains: Gains | None = None,
-    hysteresis: bool = False,
-    knobs: Knobs = AS_DESIGNED,
-) -> ElbowPid:
-    """Return the controller for a nominal plant.
-
-    Parameters
-    ----------
-    plant : ElbowOrthosis
-    signals, action_signals : Signals
-    gains : Gains, optional
-        Default: those of :func:`simc_torque`.
-    hysteresis : bool
-        Whether the nominal friction is added to the estimated torque.
-    knobs : mapping
-        Of ``KNOBS``.
-    """
-    full = plant.full_pressure
+def make_elbow_pid(spec: Spec[ElbowOrthosis], hysteresis: bool = False) -> ElbowPid:
+    """Return the controller; ``hysteresis``: whether its estimate includes nominal friction."""
+    plant = spec.plant
     return ElbowPid(
-        simc_torque(plant, knobs) if gains is None else gains,
-        make_elbow_signal_map(signals, action_signals, plant.control_period),
-        make_pressure_loop(plant) if plant.valves == "on_off" else None,
-        knob(knobs, "start") * SHARE * full,
-        full,
-        plant.control_period,
+        simc_torque(plant, spec.knobs),
+        make_elbow_signal_map(spec),
+        make_pressure_loop(spec) if plant.valves == "on_off" else None,
+        spec.knob("start") * SHARE * plant.full_pressure,
         make_elbow_friction(plant, known=hysteresis),
     )
 
 
-PID = partial(
-    Entry,
-    knowledge="nominal model",
-    feedback=True,
-    citation="skogestad2003",
-    envs=ELBOW,
-    plants=(ElbowOrthosis,),
-    knobs=KNOBS,
-)
+PID = partial(ELBOW_ENTRY, citation="skogestad2003", knobs=KNOBS)
 ENTRIES = {
     "elbow_pid": PID(
         "PI of the estimated torque about 1.2 bar in both bundles, SIMC tuning (with an assumed lag"

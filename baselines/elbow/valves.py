@@ -17,14 +17,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array
-from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
-from baselines.elbow.view import ElbowView
+from baselines.core.controller import Array, Prediction, RowController
+from baselines.core.entry import Spec
+from baselines.core.knobs import Bounds
+from baselines.elbow.view import ELBOW_ENTRY, ElbowSignalMap, ElbowView, make_elbow_signal_map
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.pneumatics.on_off_pair import mass_flow
@@ -39,43 +40,24 @@ EARLY_KNOBS: Bounds = {**KNOBS, "step": (0.5, 4.0)}
 """Also a factor on the reachable change of pressure in the next step."""
 
 
-class PressureLoop(Protocol):
-    """From reference pressures to commands."""
-
-    def commands(self, view: ElbowView, reference: Array) -> Array:
-        """Return the commands for reference pressures [Pa], shapes (2, n_env)."""
-        ...
-
-    def reach(self, view: ElbowView) -> tuple[Array, Array]:
-        """Return the lowest and the highest pressures [Pa] of the next step, shapes (2, n_env)."""
-        ...
-
-
 @dataclass(frozen=True)
 class RegulatorLoop:
-    """For proportional regulators; see the module.
-
-    Attributes
-    ----------
-    plant : ElbowOrthosis
-    """
+    """For proportional regulators; see the module."""
 
     plant: ElbowOrthosis
 
-    @cached_property
-    def lead(self) -> float:
-        """Lead of the set-point over the remaining pressure error."""
-        return max(
-            1.0, self.plant.regulator.time_constant / (LOOP_PERIODS * self.plant.control_period)
-        )
+    @property
+    def _time(self) -> float:
+        return LOOP_PERIODS * self.plant.control_period
 
     def commands(self, view: ElbowView, reference: Array) -> Array:
-        """Return set-points [Pa]; see :class:`PressureLoop`."""
-        return view.pressure + self.lead * (reference - view.pressure)
+        """Return set-points [Pa]."""
+        lead = max(1.0, self.plant.regulator.time_constant / self._time)
+        return view.pressure + lead * (reference - view.pressure)
 
     def reach(self, view: ElbowView) -> tuple[Array, Array]:
-        """Return the pressures reachable in ``LOOP_PERIODS`` periods; see :class:`PressureLoop`."""
-        law, time = self.plant.regulator, LOOP_PERIODS * self.plant.control_period
+        """Return the pressures [Pa] reachable in ``LOOP_PERIODS`` periods."""
+        law, time = self.plant.regulator, self._time
         share, most = 1.0 - math.exp(-time / law.time_constant), time * law.slew_rate
         there = view.pressure
         low = np.maximum((1.0 - share) * there, there - most)
@@ -84,17 +66,12 @@ class RegulatorLoop:
 
 @dataclass(frozen=True)
 class PulseLoop:
-    """For pairs of on/off valves; see the module.
-
-    Attributes
-    ----------
-    plant : ElbowOrthosis
-    """
+    """For pairs of on/off valves; see the module."""
 
     plant: ElbowOrthosis
 
     def commands(self, view: ElbowView, reference: Array) -> Array:
-        """Return pulse widths [s]; 0 where no pulse is accepted. See :class:`PressureLoop`."""
+        """Return pulse widths [s]; 0 where no pulse is accepted."""
         inside, still, per_volume = self._closed(view)
         short = (reference + ATMOSPHERE) / per_volume - inside
         widths = [
@@ -104,7 +81,7 @@ class PulseLoop:
         return np.where(view.accepts, np.array(widths), 0.0)
 
     def reach(self, view: ElbowView) -> tuple[Array, Array]:
-        """Return the pressures reachable by the longest pulses; see :class:`PressureLoop`."""
+        """Return the pressures [Pa] reachable by the longest pulses."""
         plant, (_, still, per_volume) = self.plant, self._closed(view)
         time = plant.cycle - plant.valve.opening_time + plant.valve.closing_time
         filled, emptied = (
@@ -115,24 +92,21 @@ class PulseLoop:
         return np.maximum(low, 0.0), np.clip(high, 0.0, plant.full_pressure)
 
     def _closed(self, view: ElbowView) -> tuple[Array, Array, Array]:
-        """Return air inside [kg], pressures without a pulse, and pressure per air, after a cycle.
+        """Return air inside [kg], pressure without a pulse [Pa], and pressure per air [Pa/kg].
 
-        All of shape (2, n_env); pressures in [Pa] and [Pa/kg].
+        After a cycle; all of shape (2, n_env).
         """
-        plant, bundles = self.plant, (self.plant.bundle_a, self.plant.bundle_b)
+        plant = self.plant
         then = np.clip(view.angle + plant.cycle * view.rate, *plant.angle_range)
-        now, after = (
-            np.array(
-                [b.volume(c) for b, c in zip(bundles, plant.pulley.contractions(q), strict=True)]
-            )
-            for q in (view.angle, then)
-        )
+        now, after = self._volumes(view.angle), self._volumes(then)
         inside = (view.pressure + ATMOSPHERE) * now / PRESSURE_PER_DENSITY
-        return (
-            inside,
-            inside * PRESSURE_PER_DENSITY / after - ATMOSPHERE,
-            PRESSURE_PER_DENSITY / after,
-        )
+        closed = inside * PRESSURE_PER_DENSITY / after - ATMOSPHERE
+        return inside, closed, PRESSURE_PER_DENSITY / after
+
+    def _volumes(self, angle: Array) -> Array:
+        """Return the volumes [m^3] of both bundles at an angle [rad]."""
+        a, b = self.plant.pulley.contractions(angle)
+        return np.array([self.plant.bundle_a.volume(a), self.plant.bundle_b.volume(b)])
 
     def _flow(self, fills: bool, pressure: float) -> float:
         """Return the flow [kg/s] into, or out of, a bundle at a pressure [Pa]."""
@@ -141,14 +115,9 @@ class PulseLoop:
         return mass_flow(*ends, valve.conductance, valve.critical_ratio)
 
     def _width(self, short: float, pressure: float, reference: float) -> float:
-        """Return the signed width [s] of the pulse that supplies missing air [kg].
+        """Return the signed width [s] of the pulse that supplies missing air ``short`` [kg].
 
-        Parameters
-        ----------
-        short : float
-            Missing air [kg]; negative for an excess.
-        pressure, reference : float
-            Of the bundle at the end of the cycle without a pulse, and desired [Pa].
+        ``pressure`` [Pa] is that of the bundle at the end of the cycle without a pulse.
         """
         valve = self.plant.valve
         flow = self._flow(short > 0.0, 0.5 * (pressure + reference))
@@ -166,30 +135,22 @@ class PulseLoop:
 
 @dataclass(frozen=True)
 class ScaledLoop:
-    """An inner loop with scaled reference and reachable range.
+    """An inner loop with factors on the reference's distance from the sensed pressure, and reach.
 
-    Attributes
-    ----------
-    loop : PressureLoop
-    factor : float
-        On the difference of reference and sensed pressure.
-    step : float
-        On the reachable change of pressure in the next step.
-    full : float
-        Largest pressure [Pa].
+    ``full`` is the largest pressure [Pa].
     """
 
-    loop: PressureLoop
+    loop: RegulatorLoop | PulseLoop
     factor: float
     step: float
     full: float
 
     def commands(self, view: ElbowView, reference: Array) -> Array:
-        """Return the commands; see :class:`PressureLoop`."""
+        """Return the commands of the inner loop."""
         return self.loop.commands(view, self._beyond(view, reference, self.factor))
 
     def reach(self, view: ElbowView) -> tuple[Array, Array]:
-        """Return the limits of the next step; see :class:`PressureLoop`."""
+        """Return the scaled limits [Pa] of the next step."""
         low, high = self.loop.reach(view)
         return self._beyond(view, low, self.step), self._beyond(view, high, self.step)
 
@@ -198,11 +159,42 @@ class ScaledLoop:
         return np.clip(sensed + factor * (pressure - sensed), 0.0, self.full)
 
 
-def make_pressure_loop(plant: ElbowOrthosis, knobs: Knobs = AS_DESIGNED) -> PressureLoop:
-    """Return the inner loop for the valves of a nominal plant.
+PressureLoop = RegulatorLoop | PulseLoop | ScaledLoop
+"""From reference pressures [Pa] to commands, and to the limits of the next step, (2, n_env)."""
 
-    Its ``knobs`` are those of ``EARLY_KNOBS``.
-    """
+
+def make_pressure_loop(spec: Spec[ElbowOrthosis]) -> PressureLoop:
+    """Return the inner loop for the valves of a nominal plant; its knobs are ``EARLY_KNOBS``."""
+    plant = spec.plant
     loop = PulseLoop(plant) if plant.valves == "on_off" else RegulatorLoop(plant)
-    factor, step = knob(knobs, "pressure_loop"), knob(knobs, "step")
+    factor, step = spec.knob("pressure_loop"), spec.knob("step")
     return loop if factor == step == 1.0 else ScaledLoop(loop, factor, step, plant.full_pressure)
+
+
+@dataclass(frozen=True)
+class ConstantPressure(RowController):
+    """Constant pressure [Pa] in both bundles."""
+
+    signals: ElbowSignalMap
+    loop: PressureLoop
+    pressure: float
+
+    def respond(self, observation: ArrayLike, state: Any) -> Prediction:
+        """Return the action and no state."""
+        view = self.signals.read(observation)
+        commands = self.loop.commands(view, np.full_like(view.pressure, self.pressure))
+        return self.signals.write(commands, observation), None
+
+
+def make_constant_pressure(spec: Spec[ElbowOrthosis]) -> ConstantPressure:
+    """Return the controller with half of the largest pressure in both bundles."""
+    return ConstantPressure(
+        make_elbow_signal_map(spec), make_pressure_loop(spec), 0.5 * spec.plant.full_pressure
+    )
+
+
+ENTRIES = {
+    "elbow_hold": ELBOW_ENTRY(
+        "constant pressure of 3 bar in both bundles", make=make_constant_pressure
+    ),
+}

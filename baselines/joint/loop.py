@@ -10,22 +10,31 @@ plant ``K p^2 / (s + p)^2``, so that the loop is ``K_p K p^2 / (s (s + p))``, an
 for a damping ``D``: ``K_p K = 1 / (4 D^2)``, ``K_i = p K_p``. At ``D = 1/sqrt(2)`` and 23 rad/s
 they are 0.5 and 11.5 1/s. The slow PI cancels the pole too, with the crossover required of the
 disturbance loop, ``K_i K = 4 rad/s`` (in proportion to ``p`` for other poles).
+
+The model loop of model-following control is computed and not measured: it runs in continuous time,
+with the reference held over a period, and its mean command over the period is applied. The model of
+the joint is driven by that mean, as the joint is, so that both differ by the model error alone.
+
+A PI in feedback has the samples only: by the bilinear rule at 10 ms it overshoots by 6.1 % in place
+of 4.3 % on the nominal plant. A comparison of the two includes the effect of sampling; to exclude
+it, run the single PI at 1 ms, where it is as good as continuous.
+
+Limits act behind the model loop, on the command: the loop continues unlimited, and the model behind
+it, which receives the limited command, lags. Nothing winds up.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 
 from baselines.joint.model import POLE, JointModel
 from baselines.linear.bumpless import Bumpless, BumplessGains
-from baselines.linear.systems import DiscreteSystem, discrete, state_space
-
-if TYPE_CHECKING:
-    from control import StateSpace
+from baselines.linear.systems import DiscreteSystem, StateSpace, discrete, double_lag, state_space
 
 DAMPING = 1.0 / math.sqrt(2.0)
 SLOW_CROSSOVER = 4.0
@@ -40,16 +49,7 @@ class PiGains(NamedTuple):
 
 
 def pole_cancelling(gain: float = 1.0, pole: float = POLE, damping: float = DAMPING) -> PiGains:
-    """Return the gains that cancel a pole and give a damping; see this module's page.
-
-    Parameters
-    ----------
-    gain : float
-        ``K`` of the nominal plant.
-    pole : float
-        [rad/s].
-    damping : float
-    """
+    """Return the gains that cancel a pole [rad/s] and give a damping; see this module's page."""
     proportional = 1.0 / (4.0 * damping**2 * gain)
     return PiGains(proportional, proportional * pole)
 
@@ -66,14 +66,27 @@ def pi_system(gains: PiGains) -> StateSpace:
 
 
 def make_loop(model: JointModel, controller: Callable[[float], StateSpace]) -> Bumpless:
-    """Return a controller as loops on the nominal model of each joint.
-
-    Parameters
-    ----------
-    model : JointModel
-    controller : callable
-        From a joint's pole [rad/s] to its controller in continuous time.
-    """
+    """Return loops on the nominal model of each joint, from its pole [rad/s] to its controller."""
     loops = [discrete(controller(pole), model.period) for pole in model.poles]
     gains = BumplessGains(np.zeros_like(model.motion.b))
     return Bumpless(DiscreteSystem.stacked(loops), model.motion, gains, model.low, model.high)
+
+
+def make_model_loop(model: JointModel, damping: float = DAMPING) -> DiscreteSystem:
+    """Return the loops of PI and model for each joint, from reference to mean command."""
+    loops = []
+    for pole in model.poles:
+        pi = pi_system(pole_cancelling(pole=pole, damping=damping))
+        loops.append(_averaged_hold(pi.feedback(double_lag(pole)), model.period))
+    return DiscreteSystem.stacked(loops)
+
+
+def _averaged_hold(system: StateSpace, period: float) -> DiscreteSystem:
+    """Return the system at a period [s], exact for a held input, with the mean output over it."""
+    n = system.nstates
+    whole = np.zeros((n + 2, n + 2))  # states, held input, integral of the output
+    whole[:n, : n + 1] = np.hstack([system.A, system.B])
+    whole[n + 1, : n + 1] = np.hstack([system.C, system.D])
+    moved = expm(whole * period)
+    mean = moved[n + 1] / period
+    return DiscreteSystem(moved[:n, :n], moved[:n, n], mean[:n], np.asarray(mean[n]), period)

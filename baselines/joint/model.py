@@ -17,9 +17,8 @@ import numpy as np
 
 from baselines.core.controller import Array
 from baselines.linear.systems import DiscreteSystem, discrete, double_lag
-from baselines.positioning.nominal import HysteresisState
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.hysteresis.protocol import Rows
+from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.identification.joint_forc import measure_joint
 
 POLE = 23.0
@@ -31,40 +30,11 @@ _HYSTERESIS_MODELS: dict[str, Preisach] = {}
 
 
 @dataclass(frozen=True)
-class LineRows:
-    """Line through 0 in place of a hysteresis."""
-
-    slope: float
-
-    def initial(self, rows: int) -> HysteresisState:
-        """Return no state."""
-        return ()
-
-    def forward(self, value: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
-        """Return the output of an input."""
-        return self.slope * value, state
-
-    def inverse(self, output: Array, state: HysteresisState) -> Array:
-        """Return the input of an output."""
-        return output / self.slope
-
-
-@dataclass(frozen=True)
 class JointModel:
-    """Nominal model of a joint.
+    """Nominal model of joints.
 
-    Attributes
-    ----------
-    hysteresis : Preisach or None
-        From set-point [rad] to angle at rest [rad]; None for a line.
-    low, high : float
-        Range of the set-point [rad].
-    period : float
-        Control period [s].
-    poles : tuple of float
-        Of each joint [rad/s], double.
-    slope : float
-        Of the line where there is no hysteresis.
+    From set-points between ``low`` and ``high`` [rad] to angles at rest [rad], by the hysteresis or
+    by a line with a slope; then the double pole of each joint [rad/s]. Control period in s.
     """
 
     hysteresis: Preisach | None
@@ -88,9 +58,9 @@ class JointModel:
         return float(self.hysteresis.everett[-1, 0]) / (self.hysteresis.high - self.hysteresis.low)
 
     @cached_property
-    def rows(self) -> Rows | LineRows:
-        """The hysteresis vectorised over rows."""
-        return LineRows(self.slope) if self.hysteresis is None else self.hysteresis.rows()
+    def rows(self) -> Rows:
+        """The hysteresis vectorised over rows; the identity for a line."""
+        return operator_of(self.hysteresis).rows()
 
     @cached_property
     def reach(self) -> tuple[float, float]:
@@ -98,12 +68,26 @@ class JointModel:
         ends = np.array([self.low, self.high])
         state = self.rows.initial(2)
         for u in (ends[::-1], ends):
-            found, state = self.rows.forward(u, state)
+            found, state = self._forward(u, state)
         return float(found[0]), float(found[1])
 
-    def virgin(self, set_point: Array) -> tuple[Array, HysteresisState]:
-        """Return angles at rest [rad] under first set-points (n,), and the state after them."""
-        return self.rows.forward(set_point, self.rows.initial(len(set_point)))
+    def start(self, set_point: Array) -> tuple[Array, RowsState]:
+        """Return angles at rest under first set-points (n_env, n_joints) [rad], and the state."""
+        return self._forward(set_point, self.rows.initial(set_point.size))
+
+    def forward(self, set_point: Array, state: RowsState) -> tuple[Array, RowsState]:
+        """Return the angles at rest [rad] under set-points, and the state after them."""
+        return self._forward(set_point, _flat(state))
+
+    def inverse(self, angle: Array, state: RowsState) -> Array:
+        """Return the set-points [rad] of angles at rest; the state is unchanged."""
+        return self.rows.inverse(angle.ravel() / self.slope, _flat(state)).reshape(angle.shape)
+
+    def _forward(self, set_point: Array, state: RowsState) -> tuple[Array, RowsState]:
+        found, after = self.rows.forward(set_point.ravel(), state)
+        shape = set_point.shape
+        packed = tuple(part.reshape(*shape, *part.shape[1:]) for part in after)
+        return self.slope * found.reshape(shape), packed
 
     def narrowed(self, width: float) -> JointModel:
         """Return the model with the hysteresis' width scaled, its tips unchanged; 0: a line."""
@@ -112,27 +96,22 @@ class JointModel:
         return replace(self, hysteresis=self.hysteresis.scaled(width, self.gain))
 
 
-def joint_model(plant: Any, levels: int = LEVELS, poles: tuple[float, ...] = (POLE,)) -> JointModel:
-    """Return the nominal model of a plant with ``rest_angles``, cached by plant.
+def _flat(state: RowsState) -> RowsState:
+    return tuple(part.reshape(np.prod(part.shape[:2]), *part.shape[2:]) for part in state)
 
-    Parameters
-    ----------
-    plant : AntagonisticJoint or RedundantManipulator
-        Nominal plant.
-    levels : int
-        Levels of the identified map.
-    poles : tuple of float
-        Of each joint [rad/s].
+
+def joint_model(plant: Any, poles: tuple[float, ...] = (POLE,)) -> JointModel:
+    """Return the nominal model of a plant with ``rest_angles``, cached by plant.
 
     Warns
     -----
     UserWarning
         If the hysteresis is not a symmetric Preisach operator; the model is then the measured map.
     """
-    key = f"{plant.digest()} {levels}"
+    key = plant.digest()
     low, high = plant.angle_range
     if key not in _HYSTERESIS_MODELS:
-        found = measure_joint(plant.rest_angles, high, levels)
+        found = measure_joint(plant.rest_angles, high, LEVELS)
         if not (found.symmetric and found.preisach):
             warnings.warn(f"the hysteresis of the nominal plant {found.verdict}", stacklevel=2)
         _HYSTERESIS_MODELS[key] = found.model

@@ -25,15 +25,7 @@ FREQUENCIES = np.geomspace(0.5, 60.0, 400)
 
 
 class JointDynamics(NamedTuple):
-    """Equivalent dynamics of a joint.
-
-    Attributes
-    ----------
-    pole : float
-        [rad/s].
-    delay : float
-        [s].
-    """
+    """Equivalent pole [rad/s] and delay [s] of a joint."""
 
     pole: float
     delay: float
@@ -43,13 +35,7 @@ _DYNAMICS: dict[str, tuple[JointDynamics, ...]] = {}
 
 
 def joint_poles(plant: Any) -> tuple[float, ...]:
-    """Return the pole of each joint [rad/s].
-
-    Parameters
-    ----------
-    plant : AntagonisticJoint or RedundantManipulator
-        Nominal plant.
-    """
+    """Return the pole of each joint [rad/s]."""
     return tuple(pace.pole for pace in joint_dynamics(plant))
 
 
@@ -82,19 +68,13 @@ def _dynamics(plant: Any, joint: int) -> JointDynamics:
 
 
 def mean_time(pulse: Array, period: float) -> float:
-    """Return the delay [s] for slow inputs from the increments of a step response.
-
-    Half a period of the hold is subtracted.
-    """
+    """Return the delay [s] for slow inputs, without the hold, from a response's increments."""
     time = (np.arange(len(pulse)) + 1.0) * period
     return float(time @ pulse / np.sum(pulse)) - 0.5 * period
 
 
 def phase(pulse: Array, period: float) -> Array:
-    """Return the phase [rad] at ``FREQUENCIES`` from the increments of a step response.
-
-    Half a period of the hold is subtracted.
-    """
+    """Return the phase [rad] at ``FREQUENCIES``, without the hold, from a response's increments."""
     time = (np.arange(len(pulse)) + 1.0) * period
     response = np.exp(-1j * np.multiply.outer(FREQUENCIES, time)) @ pulse
     return np.unwrap(np.angle(response)) + 0.5 * period * FREQUENCIES

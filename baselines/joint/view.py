@@ -13,30 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import (
-    Array,
-    Reader,
-    encode_actions,
-    preview_names,
-    reader,
-    row_count,
-)
+from baselines.core.controller import Array, Reader, encode_actions, preview_names, reader
 from pam_envs.parameters import Signal, Signals
 
 
 class JointView(NamedTuple):
-    """One observation, arrays of shape (n_env, n_joints).
+    """One observation, arrays of shape (n_env, n_joints), angles in rad.
 
-    Attributes
-    ----------
-    angle : ndarray
-        Sensed [rad].
-    set_point : ndarray
-        Of the last period [rad].
-    samples : ndarray, shape (n_env, n_joints, n_samples)
-        Reference angle [rad]: present and previewed.
-    payload : ndarray, shape (n_env,)
-        Declared payload [kg]; 0 if not observed.
+    Sensed angle, set-point of the last period, samples of the reference, present and previewed, of
+    shape (n_env, n_joints, n_samples), and declared payload [kg] of shape (n_env,), or 0.
     """
 
     angle: Array
@@ -54,18 +39,8 @@ class JointView(NamedTuple):
 class JointSignalMap:
     """Reader of observations as a :class:`JointView`, and writer of actions.
 
-    Attributes
-    ----------
-    angle, set_point : Reader
-    samples : Reader
-        Of the reference angles, joint by joint: present and previewed.
-    times : tuple of float
-        Of these samples, after the present [s].
-    payload, prestress : Reader or None
-    actions : tuple of Signal
-        Set-points of the joints, in their order.
-    prestress_action : Signal or None
-        Co-contraction, kept at its present value.
+    The samples of the references are at ``times`` [s] after the present. ``prestress_action`` is
+    the co-contraction, kept at its observed value, or in the middle of its range.
     """
 
     angle: Reader
@@ -76,16 +51,6 @@ class JointSignalMap:
     prestress: Reader | None
     actions: tuple[Signal, ...]
     prestress_action: Signal | None
-
-    @property
-    def low(self) -> float:
-        """Lowest set-point [rad]."""
-        return self.actions[0].low
-
-    @property
-    def high(self) -> float:
-        """Highest set-point [rad]."""
-        return self.actions[0].high
 
     def read(self, observation: ArrayLike) -> JointView:
         """Return the view of an observation of shape (n_obs,) or (n_env, n_obs)."""
@@ -99,29 +64,17 @@ class JointSignalMap:
 
     def write(self, set_points: Array, observation: ArrayLike) -> NDArray[np.float32]:
         """Return the action for set-points [rad], shape (n_env, n_joints)."""
-        signals, values = list(self.actions), list(set_points.T)
-        if self.prestress_action is not None:
-            signals.append(self.prestress_action)
-            values.append(self._prestress(observation))
-        return encode_actions(signals, np.array(values), observation)
-
-    def _prestress(self, observation: ArrayLike) -> Array:
-        """Return the observed co-contraction, or the middle of its range, shape (n_env,)."""
         signal = self.prestress_action
-        assert signal is not None
+        if signal is None:
+            return encode_actions(self.actions, set_points.T, observation)
+        kept = np.full(len(set_points), 0.5 * (signal.low + signal.high))
         if self.prestress is not None:
-            return np.asarray(self.prestress.rows(observation)[0])
-        return np.full(row_count(observation), 0.5 * (signal.low + signal.high))
+            kept = self.prestress.rows(observation)[0]
+        return encode_actions((*self.actions, signal), [*set_points.T, kept], observation)
 
 
 def make_joint_signal_map(signals: Signals, action_signals: Signals) -> JointSignalMap:
-    """Return the reader and writer of the signals of one joint or of a manipulator.
-
-    Raises
-    ------
-    ValueError
-        If the actions are not set-points of angles, or the reference angles are not observed.
-    """
+    """Return the reader and writer of the signals of one joint or of a manipulator."""
     actions, names = set(action_signals.names()), set(signals.names())
     ends = [""] if "angle_set_point" in actions else _numbered(actions)
     if not ends:

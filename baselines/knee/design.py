@@ -15,11 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
+from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
 from baselines.knee.identification import Output, identify
 from baselines.knee.published import printed_bumpless, printed_controller
 from baselines.linear.bumpless import Bumpless, BumplessGains, make_bumpless
 from baselines.linear.ltr import LtrDesign, design_ltr
+from baselines.linear.systems import StateSpace
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 KILO = 1e3
@@ -35,29 +36,14 @@ KNOBS: Bounds = {"bandwidth": (0.4, 4.0), "recovery": (0.1, 10.0)}
 _DESIGNS: dict[tuple[str, str, float, float], LtrDesign] = {}
 
 
-def design(
-    plant: KneeOrthosis,
-    output: Output,
-    bandwidth: float | None = None,
-    knobs: Knobs = AS_DESIGNED,
-) -> LtrDesign:
-    """Return the design for an output of a nominal plant.
-
-    Parameters
-    ----------
-    plant : KneeOrthosis
-        Identified about 2 bar, mounted as in :mod:`baselines.knee.identification`.
-    output : {"tension", "angle"}
-    bandwidth : float, optional
-        Of the target loop [rad/s]; default: the paper's.
-    knobs : mapping
-        Of ``KNOBS``.
-    """
-    target = knob(knobs, "bandwidth") * (bandwidth or BANDWIDTHS[output])
-    key = (plant.digest(), output, target, knob(knobs, "recovery"))
+def design(plant: KneeOrthosis, output: Output, knobs: Knobs = AS_DESIGNED) -> LtrDesign:
+    """Return the design for an output of a nominal plant, identified about 2 bar."""
+    target = knobs.get("bandwidth", 1.0) * BANDWIDTHS[output]
+    recovery = knobs.get("recovery", 1.0)
+    key = (plant.digest(), output, target, recovery)
     if key not in _DESIGNS:
         fit = identify(plant, output)
-        weight = knob(knobs, "recovery") * RECOVERY[plant.dynamics] * fit.static_gain**2
+        weight = recovery * RECOVERY[plant.dynamics] * fit.static_gain**2
         _DESIGNS[key] = design_ltr(fit, target, weight)
     return _DESIGNS[key]
 
@@ -66,31 +52,29 @@ def make_loop(
     plant: KneeOrthosis, output: Output, bumpless: bool = True, knobs: Knobs = AS_DESIGNED
 ) -> Bumpless:
     """Return the designed feedback of an output [Pa]; ``bumpless=False`` clamps instead."""
-    made = design(plant, output, knobs=knobs)
+    made = design(plant, output, knobs)
     gains = BumplessGains(np.zeros(made.plant.nstates))
-    whole = make_bumpless(made.plant, made.controller, plant.control_period, *_limits(plant), gains)
-    return _in_pascals(whole if bumpless else whole.without())
+    loop = _in_pascals(plant, made.plant, made.controller, gains)
+    return loop if bumpless else loop.without()
 
 
 def printed_loop(plant: KneeOrthosis) -> Bumpless:
     """Return the printed tension controller with the printed compensator, for any plant [Pa]."""
     model, gains = printed_bumpless()
-    made = make_bumpless(model, printed_controller(), plant.control_period, *_limits(plant), gains)
-    return _in_pascals(made)
+    return _in_pascals(plant, model, printed_controller(), gains)
 
 
-def _in_pascals(loop: Bumpless) -> Bumpless:
-    """Return a loop whose commands are in Pa, from one in kPa."""
+def _in_pascals(
+    plant: KneeOrthosis, model: StateSpace, controller: StateSpace, gains: BumplessGains
+) -> Bumpless:
+    """Return a loop whose commands are in Pa, from a design in kPa."""
+    full = plant.regulator.max_pressure
+    loop = make_bumpless(model, controller, plant.control_period, -full / KILO, full / KILO, gains)
     return replace(
         loop,
         controller=loop.controller.scaled(outputs=KILO),
         model=loop.model.scaled(inputs=1.0 / KILO),
         gains=replace(loop.gains, state_gain=KILO * loop.gains.state_gain),
-        low=KILO * loop.low,
-        high=KILO * loop.high,
+        low=-full,
+        high=full,
     )
-
-
-def _limits(plant: KneeOrthosis) -> tuple[float, float]:
-    full = plant.regulator.max_pressure / KILO
-    return -full, full

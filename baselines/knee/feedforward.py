@@ -1,51 +1,183 @@
-"""Feedforward of the knee: from a reference tension to a pressure.
+"""Feedforward control of the knee: from a reference tension to a pressure.
 
 The reference tension over the measured stretch of the muscle is the reference stiffness (yeh2010,
 section 4.1). Its pressure comes from the inverse of the identified hysteresis ("inverse"), from the
-straight line between the tips of its loop ("line"), or is the nominal pressure ("nominal").
+straight line between the tips of its loop ("line"), or is the nominal pressure ("nominal"). The
+inverse is static, as in yeh2010, without the regulator's lag; with a preview it tracks the
+reference stiffness of one lag later.
+
+In stance, and with the brace alone, the reference tension is tracked; in swing the tension cancels
+the wire's torque on the knee.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array
-from baselines.knee.nominal import KneeNominal
+from baselines.core.controller import (
+    Array,
+    Prediction,
+    Reader,
+    RowController,
+    encode_action,
+    preview_names,
+    preview_weights,
+    reader,
+)
+from baselines.core.entry import Entry, Spec
+from baselines.core.environments import GAIT, KNEE
+from baselines.core.knobs import Bounds
 from baselines.knee.published import NOMINAL_PRESSURE
-from baselines.positioning.nominal import HysteresisState
+from baselines.knee.view import KneeObserver, KneeView, make_knee_observer
+from pam_envs.hysteresis.protocol import RowsState
+from pam_envs.parameters import Signal
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 Kind = Literal["nominal", "line", "inverse"]
+KNOBS: Bounds = {"lead": (0.25, 4.0)}
+
+
+@dataclass(frozen=True)
+class StiffnessPreview:
+    """Interpolation of the previewed reference stiffness [N/m] at a later time.
+
+    Readers of the references and their previews, the angle's with a gait alone, and weights of
+    their samples.
+    """
+
+    observer: KneeObserver
+    tension: Reader
+    angle: Reader | None
+    weights: Array
+
+    def reference(self, observation: ArrayLike) -> Array:
+        """Return the reference stiffness [N/m], shape (n_env,)."""
+        samples, nominal = self.tension.rows(observation), self.observer.nominal
+        if not self.observer.stiffness:
+            planned = self.angle.rows(observation) if self.angle else nominal.angle_of(samples)
+            samples = samples / nominal.stretch(planned)
+        return np.add.reduce(self.weights[:, None] * samples, axis=0)
+
+    def free(self, angle: Reader, observation: ArrayLike) -> Array:
+        """Return the stiffness [N/m] of zero wire torque on the knee, shape (n_env,)."""
+        angles, nominal = angle.rows(observation), self.observer.nominal
+        samples = nominal.free_tension(angles) / nominal.stretch(angles)
+        return np.add.reduce(self.weights[:, None] * samples, axis=0)
 
 
 @dataclass(frozen=True)
 class Forward:
-    """Feedforward; its state is that of the nominal hysteresis.
+    """Feedforward, its reference previewed or present; its state is the nominal hysteresis."""
 
-    Attributes
-    ----------
-    nominal : KneeNominal
-    kind : {"nominal", "line", "inverse"}
-    """
-
-    nominal: KneeNominal
     kind: Kind
+    observer: KneeObserver
+    preview: StiffnessPreview | None
 
-    def start(self, pressure: Array) -> HysteresisState:
+    def tensions(self, view: KneeView, observation: ArrayLike) -> tuple[Array, Array]:
+        """Return the reference tension, and that of zero wire torque on the knee [N]."""
+        free = self.observer.nominal.free_tension(view.angle)
+        if self.preview is None:
+            return view.reference, free
+        if self.preview.angle is not None:
+            free = self.preview.free(self.preview.angle, observation) * view.stretch
+        return self.preview.reference(observation) * view.stretch, free
+
+    def start(self, pressure: Array) -> RowsState:
         """Return the state after inflation to a pressure [Pa], shape (n_env,)."""
-        return self.nominal.inflated(pressure) if self.kind == "inverse" else ()
+        return self.observer.nominal.inflated(pressure) if self.kind == "inverse" else ()
 
-    def pressure(self, tension: Array, stretch: Array, state: HysteresisState) -> Array:
+    def pressure(self, tension: Array, stretch: Array, state: RowsState) -> Array:
         """Return the pressure [Pa], within the capacity, for a tension [N] at a stretch [m]."""
         if self.kind == "nominal":
             return np.full_like(tension, NOMINAL_PRESSURE)
-        stiffness = np.maximum(0.0, tension) / stretch
+        nominal, stiffness = self.observer.nominal, np.maximum(0.0, tension) / stretch
         if self.kind == "inverse":
-            return self.nominal.pressure_for(stiffness, state)
-        return np.minimum(self.nominal.line(stiffness), self.nominal.full_pressure)
+            return nominal.pressure_for(stiffness, state)
+        return np.minimum(nominal.line(stiffness), nominal.full_pressure)
 
-    def advance(self, pressure: Array, state: HysteresisState) -> HysteresisState:
+    def advance(self, pressure: Array, state: RowsState) -> RowsState:
         """Return the state after a pressure [Pa] of this feedforward."""
-        return self.nominal.advance(pressure, state) if self.kind == "inverse" else state
+        return self.observer.nominal.advance(pressure, state) if self.kind == "inverse" else state
+
+
+def make_forward(spec: Spec[KneeOrthosis], kind: Kind, preview: bool) -> Forward:
+    """Return the feedforward; a preview is by the regulator's lag and half a control period."""
+    observer, ahead, signals = make_knee_observer(spec), None, spec.signals
+    if preview:
+        names = preview_names("reference", signals)
+        delay = spec.plant.regulator.time_constant + 0.5 * spec.plant.control_period
+        times = [signals[name].ahead for name in names]
+        angles = preview_names("angle_reference", signals)
+        ahead = StiffnessPreview(
+            observer,
+            reader(signals, names),
+            reader(signals, angles) if observer.gait else None,
+            preview_weights(times, spec.knob("lead") * delay),
+        )
+    return Forward(kind, observer, ahead)
+
+
+@dataclass(frozen=True)
+class KneeForward(RowController):
+    """Feedforward control; see the module.
+
+    ``assist``: whether the reference is tracked in stance; otherwise the wire's torque is
+    cancelled throughout, so that the orthosis neither assists nor resists.
+    """
+
+    forward: Forward
+    action_signal: Signal
+    assist: bool
+
+    def initial_state(self, observation: ArrayLike) -> RowsState:
+        """Return the state after inflation to the present set-point."""
+        return self.forward.start(self.forward.observer.read(observation).set_point)
+
+    def respond(self, observation: ArrayLike, state: RowsState) -> Prediction:
+        """Return the action and the next state."""
+        view = self.forward.observer.read(observation)
+        reference, free = self.forward.tensions(view, observation)
+        tension = np.where(view.stance & self.assist, reference, free)
+        pressure = self.forward.pressure(tension, view.stretch, state)
+        after = self.forward.advance(pressure, state)
+        return encode_action(self.action_signal, pressure, observation), after
+
+
+def make_knee_forward(
+    spec: Spec[KneeOrthosis], kind: Kind = "inverse", assist: bool = True, preview: bool = False
+) -> KneeForward:
+    """Return the controller; ``preview``: whether the reference is previewed by one lag."""
+    signal = spec.actions["pressure_set_point"]
+    return KneeForward(make_forward(spec, kind, preview), signal, assist)
+
+
+FORWARD = partial(Entry, knowledge="nominal model", envs=KNEE, plants=(KneeOrthosis,))
+ENTRIES = {
+    "knee_free": FORWARD(
+        "inverse for zero torque on the knee: neither assistance nor resistance",
+        make=partial(make_knee_forward, assist=False),
+        citation="yeh2010",
+        envs=GAIT,
+    ),
+    "knee_line": FORWARD(
+        "straight line between the tips of the loop: hysteresis ignored",
+        make=partial(make_knee_forward, kind="line"),
+    ),
+    "knee_inverse": FORWARD(
+        "inverse of the hysteresis at the present reference, as in the paper",
+        make=make_knee_forward,
+        citation="yeh2010",
+    ),
+    "knee_inverse_ahead": FORWARD(
+        "knee_inverse at the reference previewed by one lag of the regulator",
+        make=partial(make_knee_forward, preview=True),
+        preview=True,
+        citation="yeh2010",
+        knobs=KNOBS,
+    ),
+}

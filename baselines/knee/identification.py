@@ -71,10 +71,7 @@ def tested(plant: KneeOrthosis, output: Output) -> KneeOrthosis:
 
 
 def frequency_response(
-    plant: KneeOrthosis,
-    output: Output,
-    frequencies: Array = FREQUENCIES,
-    amplitude: float = AMPLITUDE,
+    plant: KneeOrthosis, output: Output, frequencies: Array = FREQUENCIES
 ) -> NDArray[np.complex128]:
     """Return the response from pressure set-point [kPa] to an output, one sine a run.
 
@@ -86,8 +83,6 @@ def frequency_response(
         [N] or [rad].
     frequencies : ndarray, shape (m,)
         Angular frequencies [rad/s].
-    amplitude : float
-        [Pa].
 
     Returns
     -------
@@ -96,7 +91,7 @@ def frequency_response(
     """
     h = plant.control_period
     time = h * np.arange(round((SETTLING + MEASURED) / h), dtype=float)
-    swing = amplitude * np.sin(np.multiply.outer(time, frequencies))
+    swing = AMPLITUDE * np.sin(np.multiply.outer(time, frequencies))
     record = simulate_knee(plant, CENTRE + swing, pressure=CENTRE)[output]
     found = [
         _harmonic(time + h, record[:, k], w) / _harmonic(time, swing[:, k], w)

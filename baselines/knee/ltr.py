@@ -21,63 +21,37 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Prediction, RowController, encode_action
-from baselines.core.entry import Entry
-from baselines.core.environments import GAIT, KNEE
-from baselines.core.knobs import AS_DESIGNED, Knobs
+from baselines.core.entry import Spec
+from baselines.core.environments import GAIT
 from baselines.knee.design import KNOBS, make_loop, printed_loop
-from baselines.knee.feedforward import Forward, Kind
-from baselines.knee.nominal import KneeNominal
-from baselines.knee.preview import KNOBS as PREVIEW_KNOBS
-from baselines.knee.preview import StiffnessPreview, free_tension, make_stiffness_preview, tension
-from baselines.knee.view import KneeObserver, KneeView, make_knee_observer
+from baselines.knee.feedforward import FORWARD, Forward, Kind, make_forward
+from baselines.knee.feedforward import KNOBS as PREVIEW_KNOBS
 from baselines.linear.bumpless import Bumpless, BumplessState
-from baselines.positioning.nominal import HysteresisState
-from pam_envs.parameters import Signal, Signals
+from pam_envs.hysteresis.protocol import RowsState
+from pam_envs.parameters import Signal
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 
 class LtrState(NamedTuple):
-    """States of both controllers and of the feedforward's hysteresis, first axis n_env.
-
-    Attributes
-    ----------
-    tension : BumplessState
-    angle : BumplessState or tuple
-        Empty without a gait.
-    hysteresis : tuple of ndarray
-    """
+    """States of both controllers, no angle without a gait, and of the feedforward's hysteresis."""
 
     tension: BumplessState
     angle: BumplessState | tuple[()]
-    hysteresis: HysteresisState
+    hysteresis: RowsState
 
 
 @dataclass(frozen=True)
 class KneeLtr(RowController):
-    """Feedback and feedforward; see the module.
-
-    Attributes
-    ----------
-    tension : Bumpless
-    angle : Bumpless, optional
-        None without a gait.
-    forward : Forward
-    observer : KneeObserver
-    action_signal : Signal
-    preview : StiffnessPreview, optional
-        Of the feedforward, by one lag.
-    """
+    """Feedback of tension and, with a gait, of the angle, and feedforward; see the module."""
 
     tension: Bumpless
     angle: Bumpless | None
     forward: Forward
-    observer: KneeObserver
     action_signal: Signal
-    preview: StiffnessPreview | None = None
 
     def initial_state(self, observation: ArrayLike) -> LtrState:
         """Return the state at rest, or holding the present set-point."""
-        view = self.observer.read(observation)
+        view = self.forward.observer.read(observation)
         held = np.zeros_like(view.set_point)
         if self.forward.kind == "nominal":
             held = view.set_point - self.forward.pressure(view.reference, view.stretch, ())
@@ -85,36 +59,23 @@ class KneeLtr(RowController):
         return LtrState(self.tension.holding_state(held), angle, self.forward.start(view.set_point))
 
     def respond(self, observation: ArrayLike, state: LtrState) -> Prediction:
-        """See :class:`~baselines.core.controller.RowController`."""
-        view = self.observer.read(observation)
-        forward, free = self._forward(view, observation, state.hysteresis)
-        stance = forward + self._share(
-            self.tension, view.reference, view.tension, forward, state[0]
-        )
-        command, used, angle = stance, forward, state.angle
+        """Return the action and the next state."""
+        view, forward = self.forward.observer.read(observation), self.forward
+        reference, free = forward.tensions(view, observation)
+        stance = forward.pressure(reference, view.stretch, state.hysteresis)
+        tension = view.reference, view.tension
+        command = stance + self._share(self.tension, *tension, stance, state.tension)
+        used, after = stance, state.angle
         if self.angle is not None and state.angle:
-            path, sensed = view.angle_reference, view.angle
-            swing = free + self._share(self.angle, path, sensed, free, state.angle)
-            command = np.where(view.stance, stance, swing)
-            used = np.where(view.stance, forward, free)
-            off = ~view.stance
-            angle = self.angle.advance(path, sensed, command - free, state.angle, off)
-        stance_state = self.tension.advance(
-            view.reference, view.tension, command - forward, state.tension, view.stance
-        )
-        after = LtrState(stance_state, angle, self.forward.advance(used, state.hysteresis))
-        return encode_action(self.action_signal, command, observation), after
-
-    def _forward(
-        self, view: KneeView, observation: ArrayLike, hysteresis: HysteresisState
-    ) -> tuple[Array, Array]:
-        """Return the feedforward pressures [Pa] of stance and of swing."""
-        reference = tension(self.preview, view, observation)
-        stance = self.forward.pressure(reference, view.stretch, hysteresis)
-        if self.angle is None:
-            return stance, stance
-        free = free_tension(self.observer, self.preview, view, observation)
-        return stance, self.forward.pressure(free, view.stretch, hysteresis)
+            path = view.angle_reference, view.angle
+            swing = forward.pressure(free, view.stretch, state.hysteresis)
+            swung = swing + self._share(self.angle, *path, swing, state.angle)
+            command = np.where(view.stance, command, swung)
+            used = np.where(view.stance, stance, swing)
+            after = self.angle.advance(*path, command - swing, state.angle, ~view.stance)
+        held = self.tension.advance(*tension, command - stance, state.tension, view.stance)
+        following = LtrState(held, after, forward.advance(used, state.hysteresis))
+        return encode_action(self.action_signal, command, observation), following
 
     def _share(
         self,
@@ -130,46 +91,28 @@ class KneeLtr(RowController):
 
 
 def make_knee_ltr(
-    plant: KneeOrthosis,
-    signals: Signals,
-    action_signals: Signals,
+    spec: Spec[KneeOrthosis],
     forward: Kind = "inverse",
     bumpless: bool = True,
     printed: bool = False,
     preview: bool = False,
-    knobs: Knobs = AS_DESIGNED,
 ) -> KneeLtr:
-    """Return the controller for a nominal plant.
+    """Return the controller.
 
-    Parameters
-    ----------
-    plant : KneeOrthosis
-    signals, action_signals : Signals
-    forward : {"inverse", "line", "nominal"}
-    bumpless : bool
-        Whether the compensators act.
-    printed : bool
-        Whether the tension controller is the printed one instead of a design.
-    preview : bool
-        Whether the feedforward is previewed by one lag.
-    knobs : mapping
-        Of :data:`baselines.knee.design.KNOBS`, for the tension loop alone, and of
-        :data:`baselines.knee.preview.KNOBS`.
+    ``bumpless``: whether the compensators act; ``printed``: whether the tension controller is the
+    printed one; ``preview``: whether the feedforward is previewed by one lag. The knobs of
+    :data:`baselines.knee.design.KNOBS` are for the tension loop alone.
     """
-    nominal = KneeNominal(plant)
-    observer = make_knee_observer(nominal, signals)
-    loop = printed_loop(plant) if printed else make_loop(plant, "tension", bumpless, knobs)
+    plant, ahead = spec.plant, make_forward(spec, forward, preview)
     return KneeLtr(
-        loop,
-        make_loop(plant, "angle", bumpless) if observer.gait else None,
-        Forward(nominal, forward),
-        observer,
-        action_signals["pressure_set_point"],
-        make_stiffness_preview(nominal, signals, observer, knobs) if preview else None,
+        printed_loop(plant) if printed else make_loop(plant, "tension", bumpless, spec.knobs),
+        make_loop(plant, "angle", bumpless) if ahead.observer.gait else None,
+        ahead,
+        spec.actions["pressure_set_point"],
     )
 
 
-LTR = partial(Entry, knowledge="nominal model", feedback=True, envs=KNEE, plants=(KneeOrthosis,))
+LTR = partial(FORWARD, feedback=True)
 ENTRIES = {
     "knee_ltr": LTR(
         "loop transfer recovery on the identified plant, about 2 bar",
@@ -197,14 +140,11 @@ ENTRIES = {
         citation="yeh2010; athans1986; zaccarian2002",
         knobs={**KNOBS, **PREVIEW_KNOBS},
     ),
-    "knee_inverse_ltr_bumpy": Entry(
+    "knee_inverse_ltr_bumpy": LTR(
         "knee_inverse_ltr without compensators: each loop integrates off-line, clamped in charge",
-        "nominal model",
-        partial(make_knee_ltr, bumpless=False),
-        feedback=True,
+        make=partial(make_knee_ltr, bumpless=False),
         citation="yeh2010; athans1986",
         envs=GAIT,
-        plants=(KneeOrthosis,),
     ),
     "knee_printed": LTR(
         "knee_inverse_ltr with the printed tension controller (11) and compensator; for"

@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from baselines.core.controller import Array
-from baselines.positioning.nominal import HysteresisState
-from pam_envs.hysteresis.protocol import Rows, operator_of
+from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 SHORTEST_STRETCH = 1e-3
@@ -22,13 +21,7 @@ CURVE_POINTS = 451
 
 @dataclass(frozen=True)
 class KneeNominal:
-    """The nominal orthosis.
-
-    Attributes
-    ----------
-    plant : KneeOrthosis
-        Nominal plant.
-    """
+    """The nominal orthosis."""
 
     plant: KneeOrthosis
 
@@ -59,36 +52,28 @@ class KneeNominal:
         """Return the tension [N] of zero wire torque on the knee, at least 0."""
         return np.maximum(0.0, self.plant.tension_for(angle))
 
-    # --- stiffness and pressure -----------------------------------------------------------------
-
     def line(self, stiffness: Array) -> Array:
         """Return the pressure [Pa] of a stiffness [N/m] on the line between the loop's tips."""
         return np.asarray(stiffness * (self.full_pressure / self._full_stiffness))
 
     @cached_property
     def _full_stiffness(self) -> float:
-        full = np.array([self.full_pressure])
-        return self._per_output * float(
-            self.hysteresis.forward(full, self.hysteresis.initial(1))[0][0]
-        )
+        full, empty = np.array([self.full_pressure]), self.hysteresis.initial(1)
+        return self._per_output * float(self.hysteresis.forward(full, empty)[0][0])
 
-    def inflated(self, pressure: Array) -> HysteresisState:
+    def inflated(self, pressure: Array) -> RowsState:
         """Return the hysteresis state after inflation from 0 to a pressure [Pa]."""
-        _, state = self.hysteresis.forward(
-            np.zeros_like(pressure), self.hysteresis.initial(len(pressure))
-        )
-        return self.advance(pressure, state)
+        empty = self.hysteresis.initial(len(pressure))
+        return self.advance(pressure, self.advance(np.zeros_like(pressure), empty))
 
-    def advance(self, pressure: Array, state: HysteresisState) -> HysteresisState:
+    def advance(self, pressure: Array, state: RowsState) -> RowsState:
         """Return the hysteresis state after a pressure [Pa]."""
         return self.hysteresis.forward(pressure, state)[1]
 
-    def pressure_for(self, stiffness: Array, state: HysteresisState) -> Array:
+    def pressure_for(self, stiffness: Array, state: RowsState) -> Array:
         """Return the pressure [Pa], within the capacity, of a stiffness [N/m] after a history."""
         found = self.hysteresis.inverse(stiffness / self._per_output, state)
         return np.minimum(np.maximum(found, 0.0), self.full_pressure)
-
-    # --- rest -------------------------------------------------------------------------------------
 
     def tension_at_rest(self, pressure: Array) -> Array:
         """Return the tension [N] at rest without hysteresis: held in a rig, or free to move.

@@ -13,7 +13,6 @@ coefficients (:func:`refit_controller`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -21,10 +20,7 @@ from scipy.optimize import least_squares
 from baselines.core.controller import Array
 from baselines.linear.bumpless import BumplessGains
 from baselines.linear.ltr import LtrDesign, design_ltr
-from baselines.linear.systems import from_polynomials, from_roots, state_space
-
-if TYPE_CHECKING:
-    from control import StateSpace
+from baselines.linear.systems import StateSpace, from_polynomials, from_roots, state_space
 
 NOMINAL_PRESSURE = 2e5
 """Operating pressure [Pa] (yeh2010, section 4.1)."""
@@ -78,17 +74,7 @@ def printed_bumpless() -> tuple[StateSpace, BumplessGains]:
 
 @dataclass(frozen=True)
 class Refit:
-    """The inferred plant, and the printed controller as its design.
-
-    Attributes
-    ----------
-    design : LtrDesign
-        Of the inferred plant.
-    fourth_zero : float
-        [rad/s].
-    largest_error : float
-        Of the nine coefficients, relative.
-    """
+    """Design of the inferred plant, its fourth zero [rad/s], and the largest relative error."""
 
     design: LtrDesign
     fourth_zero: float
@@ -98,10 +84,7 @@ class Refit:
 def refit_controller(bandwidth: float | None = None) -> Refit:
     """Return the plant and the design that reproduce the printed controller.
 
-    Parameters
-    ----------
-    bandwidth : float, optional
-        ``1/sqrt(mu)`` [rad/s], fixed; free if not given.
+    ``bandwidth`` is ``1/sqrt(mu)`` [rad/s], free if not given.
     """
     start = [0.0, 0.0, 0.0] if bandwidth else [0.0, 0.0, 0.0, 0.0]
 

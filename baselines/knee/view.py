@@ -8,35 +8,26 @@ stiffness ``s`` becomes the reference tension ``s (L - L_min)`` at the sensed an
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Reader, Rows, reader
+from baselines.core.entry import Spec
 from baselines.knee.nominal import KneeNominal
-from pam_envs.parameters import Signals
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 NAMES = ("tension", "angle", "set_point", "reference")
 GAIT_NAMES = ("stance", "angle_reference")
 
 
 class KneeView(NamedTuple):
-    """One observation of every row, arrays of shape (n_env,).
+    """One observation of every row in SI, arrays of shape (n_env,).
 
-    Attributes
-    ----------
-    tension, angle, set_point : ndarray
-        Sensed [N], [rad]; of the last period [Pa].
-    reference : ndarray
-        Reference tension [N]; in swing that of the tension controller off-line.
-    stretch : ndarray
-        Muscle's length above its shortest [m].
-    stance : ndarray of bool
-        Rows that track the tension; all without a gait.
-    angle_reference : ndarray
-        Reference angle [rad] in swing; the sensed angle without a gait.
+    Sensed tension and angle, the set-point of the last period, the reference tension (in swing that
+    of the tension controller off-line), the muscle's length above its shortest, rows in stance, and
+    the reference angle of the swing. Without a gait all rows are in stance, with the sensed angle.
     """
 
     tension: Array
@@ -52,14 +43,7 @@ class KneeView(NamedTuple):
 class KneeObserver:
     """Reader of observations as a :class:`KneeView`.
 
-    Attributes
-    ----------
-    nominal : KneeNominal
-    reader : Reader
-    gait : bool
-        Whether there is stance and swing.
-    stiffness : bool
-        Whether the reference is a stiffness.
+    ``gait``: whether there is stance and swing; ``stiffness``: whether the reference is one.
     """
 
     nominal: KneeNominal
@@ -69,30 +53,20 @@ class KneeObserver:
 
     def read(self, observation: ArrayLike) -> KneeView:
         """Return the view of an observation of shape (n_obs,) or (n_env, n_obs)."""
-        tension, angle, set_point, reference, *more = self.reader.rows(observation)
+        tension, angle, set_point, reference, *phase = self.reader.rows(observation)
         stretch = self.nominal.stretch(angle)
         if self.stiffness:
             reference = reference * stretch
-        stance, path = self._phase(more, angle)
+        stance, path = (phase[0] > 0.5, phase[1]) if phase else (np.ones(len(angle), bool), angle)
         return KneeView(tension, angle, set_point, reference, stretch, stance, path)
 
-    def _phase(self, more: list[Array], angle: Array) -> tuple[Rows, Array]:
-        if not self.gait:
-            return np.ones(len(angle), bool), angle
-        return more[0] > 0.5, more[1]
 
-    @cached_property
-    def full_pressure(self) -> float:
-        """Capacity [Pa] of the nominal muscle."""
-        return self.nominal.full_pressure
-
-
-def make_knee_observer(nominal: KneeNominal, signals: Signals) -> KneeObserver:
+def make_knee_observer(spec: Spec[KneeOrthosis]) -> KneeObserver:
     """Return the reader of the signals of any environment of the knee."""
-    there = set(signals.names())
-    gait = set(GAIT_NAMES) <= there
-    names = [*NAMES, *(GAIT_NAMES if gait else ())]
+    signals = spec.signals
+    gait = set(GAIT_NAMES) <= set(signals.names())
     unit = signals["reference"].unit
     if unit not in ("N", "N/m"):
         raise ValueError(f"reference is in {unit}; the knee's controllers track N or N/m")
-    return KneeObserver(nominal, reader(signals, names), gait, unit == "N/m")
+    names = [*NAMES, *(GAIT_NAMES if gait else ())]
+    return KneeObserver(KneeNominal(spec.plant), reader(signals, names), gait, unit == "N/m")

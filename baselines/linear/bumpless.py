@@ -32,17 +32,14 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cdf2rdf
 
 from baselines.core.controller import Array
-from baselines.linear.systems import DiscreteSystem, discrete, time_constant
-
-if TYPE_CHECKING:
-    from control import StateSpace
+from baselines.linear.systems import DiscreteSystem, StateSpace, discrete, time_constant
 
 SMALLEST = 1e-7
 """Distance from the inequality's bound that counts as feasible."""
@@ -54,15 +51,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class BumplessGains:
-    """Gains of a compensator.
-
-    Attributes
-    ----------
-    state_gain : ndarray, shape (*lanes, n)
-        ``K`` in the coordinates of the plant that they were designed for.
-    direct_gain : float
-        ``L``, below 1.
-    """
+    """Gains ``K``, shape (*lanes, n), in the coordinates of the plant, and ``L``, below 1."""
 
     state_gain: Array
     direct_gain: float = 0.0
@@ -81,14 +70,7 @@ class BumplessGains:
 
 
 class BumplessState(NamedTuple):
-    """States of a controller and of the model beside it.
-
-    Attributes
-    ----------
-    controller : ndarray, shape (..., *lanes, n_controller)
-    model : ndarray, shape (..., *lanes, n_plant)
-        ``xi``.
-    """
+    """States of a controller and of the model beside it, ``xi``, shapes (..., *lanes, n)."""
 
     controller: Array
     model: Array
@@ -103,14 +85,8 @@ class Bumpless:
 
     Attributes
     ----------
-    controller : DiscreteSystem
-        From reference less measurement to command.
-    model : DiscreteSystem
-        The plant at the same period, strictly proper.
-    gains : BumplessGains
-        In the coordinates of ``model``.
-    low, high : float
-        Limits of the command.
+    controller, model : DiscreteSystem
+        From reference less measurement to command; the plant at the same period, strictly proper.
     compensated : bool
         Whether the compensator acts. Without it the controller sees the measurement itself, and in
         charge it clamps against windup: an error that would drive a limited command further is
@@ -156,12 +132,7 @@ class Bumpless:
     ) -> Array:
         """Return the command of a controller in charge, shape (..., *lanes), within the limits.
 
-        Parameters
-        ----------
-        reference, measured : array_like, shape (..., *lanes)
-        state : BumplessState
-        low, high : array_like, optional
-            Limits at this instant, where a feedforward takes a part of the range.
+        ``low`` and ``high`` are limits at this instant, where a feedforward takes a part.
         """
         command = self.controller.output(self._error(reference, measured, state), state.controller)
         if self.compensated:
@@ -238,12 +209,9 @@ def design_bumpless(plant: StateSpace, decay: float = 0.0) -> BumplessGains:
     """
     import cvxpy as cp
 
-    modes = _modes(plant)
-    n, b, rate = plant.nstates, modes.b[:, None], decay * modes.time
+    modes, n = _modes(plant), plant.nstates
     q, v, x = cp.Variable((n, n), symmetric=True), cp.Variable(), cp.Variable((1, n))
-    drift = modes.a @ q + b @ x
-    corner = drift + drift.T + 2.0 * rate * q
-    margin = _best_margin(corner, x.T - v * b, -2.0 * v, q, v, PENALTY * cp.norm(x))
+    margin = _best_margin(modes, decay, q, v, x, x.T - v * modes.b, PENALTY * cp.norm(x))
     if not margin > SMALLEST:
         raise ValueError(
             f"decay is {decay}; it must be below {_slowest(plant):.4g}, the decay rate of the"
@@ -254,34 +222,22 @@ def design_bumpless(plant: StateSpace, decay: float = 0.0) -> BumplessGains:
 
 
 def certificate(plant: StateSpace, gains: BumplessGains, decay: float = 0.0) -> float:
-    """Return the distance of given gains from the inequality's bound: above 0 if they satisfy it.
+    """Return the distance of gains from the inequality's bound: above 0 if they satisfy it.
 
-    Parameters
-    ----------
-    plant : control.StateSpace
-    gains : BumplessGains
-        In the coordinates of ``plant``.
-    decay : float
-        ``alpha`` [1/s].
-
-    Returns
-    -------
-    float
-        Largest distance of the eigenvalues from 0 over all ``Q`` and ``U`` that are not above 1,
-        in the coordinates of :func:`design_bumpless`.
+    Largest distance of the eigenvalues from 0 over all ``Q`` and ``U`` that are not above 1, at the
+    rate ``decay``, ``alpha`` [1/s].
     """
     import cvxpy as cp
 
-    modes = _modes(plant)
-    n, b, rate = plant.nstates, modes.b[:, None], decay * modes.time
+    modes, n = _modes(plant), plant.nstates
     f = (gains.feedback @ modes.basis)[None, :]
     q, u = cp.Variable((n, n), symmetric=True), cp.Variable()
-    drift = (modes.a + b @ f) @ q
-    corner = drift + drift.T + 2.0 * rate * q
-    return _best_margin(corner, q @ f.T - b * u, -2.0 * u, q, u)
+    return _best_margin(modes, decay, q, u, f @ q, q @ f.T - modes.b * u)
 
 
 class _Modes(NamedTuple):
+    """Real modal coordinates ``z``, ``x = basis z``, in time over ``time`` [s]."""
+
     a: Array
     b: Array
     basis: Array
@@ -289,7 +245,6 @@ class _Modes(NamedTuple):
 
 
 def _modes(plant: StateSpace) -> _Modes:
-    """Return real modal coordinates ``z``, ``x = basis z``, of a stable plant."""
     if _slowest(plant) <= 0.0:
         raise ValueError(
             f"a pole has real part {-_slowest(plant):.4g}; the plant must be stable for its model"
@@ -301,25 +256,26 @@ def _modes(plant: StateSpace) -> _Modes:
     sizes = np.abs(b)
     for k in np.flatnonzero(np.diag(a, 1)):  # the two of a pair share one size
         sizes[k : k + 2] = np.hypot(b[k], b[k + 1])
-    return _Modes(a, b / sizes, basis * sizes, time)
+    return _Modes(a, (b / sizes)[:, None], basis * sizes, time)
 
 
 def _slowest(plant: StateSpace) -> float:
     return float(-np.max(plant.poles().real))
 
 
-def _joined(corner: Any, side: Any, last: Any) -> Any:
+def _best_margin(
+    modes: _Modes, decay: float, q: Any, u: Any, x: Any, side: Any, penalty: Any = 0.0
+) -> float:
+    """Return the largest distance of the inequality from its bound, 0 or below if infeasible.
+
+    ``x`` is ``X1``, and ``u`` is ``U + X2``.
+    """
     import cvxpy as cp
 
-    return cp.bmat([[corner, side], [side.T, cp.reshape(last, (1, 1), order="C")]])
-
-
-def _best_margin(corner: Any, side: Any, last: Any, q: Any, u: Any, penalty: Any = 0.0) -> float:
-    """Return the largest distance of the inequality from its bound, 0 or below if infeasible."""
-    import cvxpy as cp
-
-    n, margin = q.shape[0], cp.Variable()
-    whole = _joined(corner, side, last)
+    n, margin, last = q.shape[0], cp.Variable(), -2.0 * u
+    drift = modes.a @ q + modes.b @ x
+    corner = drift + drift.T + 2.0 * decay * modes.time * q
+    whole = cp.bmat([[corner, side], [side.T, cp.reshape(last, (1, 1), order="C")]])
     bounds = [whole << -margin * np.eye(n + 1), q >> margin * np.eye(n), u >= margin]
     problem = cp.Problem(cp.Maximize(margin - penalty), [*bounds, q << np.eye(n), u <= 1.0])
     with warnings.catch_warnings():  # the solution is judged below by its own eigenvalues

@@ -18,7 +18,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,16 +27,13 @@ from baselines.core.controller import Array
 from baselines.linear.systems import (
     Complex,
     DiscreteSystem,
-    Method,
+    StateSpace,
     discrete,
     response,
     state_space,
     time_constant,
 )
 from pam_envs.identification.frequency import RationalFit
-
-if TYPE_CHECKING:
-    from control import StateSpace
 
 Response = Callable[[NDArray[np.float64]], Complex]
 POINTS = 2001
@@ -75,16 +71,10 @@ class LoopFigures:
 
 @dataclass(frozen=True)
 class LtrDesign:
-    """A controller by loop transfer recovery, and its plant.
+    """A controller by loop transfer recovery, from reference less output, and its plant.
 
-    Attributes
-    ----------
-    plant, controller : control.StateSpace
-        The input of the controller is reference less output.
-    bandwidth : float
-        Of the target loop [rad/s].
-    control_weight : float
-        ``rho``, in units of the output squared per (control unit per second) squared.
+    The bandwidth is that of the target loop [rad/s], the control weight ``rho``, in units of the
+    output squared per (control unit per second) squared.
     """
 
     plant: StateSpace
@@ -97,23 +87,19 @@ class LtrDesign:
         """Figures of the loop of plant and controller in continuous time."""
         return loop_figures(lambda w: response(self.plant, w) * response(self.controller, w))
 
-    def discrete(self, period: float, method: Method = "bilinear") -> DiscreteSystem:
+    def discrete(self, period: float) -> DiscreteSystem:
         """Return the controller at a control period [s]."""
-        return discrete(self.controller, period, method)
+        return discrete(self.controller, period)
 
-    def sampled_figures(
-        self, period: float, delay: float = 0.0, method: Method = "bilinear"
-    ) -> LoopFigures:
+    def sampled_figures(self, period: float, delay: float = 0.0) -> LoopFigures:
         """Return the figures of the loop at a control period, its hold and a delay [s] included."""
-        return sampled_figures(self.plant, self.discrete(period, method), delay)
+        return sampled_figures(self.plant, self.discrete(period), delay)
 
 
 def design_ltr(
     plant: StateSpace | RationalFit, bandwidth: float, control_weight: float
 ) -> LtrDesign:
     """Return the controller of loop transfer recovery; see this module's page.
-
-    Time is scaled by the geometric mean of the poles for the Riccati equation.
 
     Parameters
     ----------
@@ -129,7 +115,7 @@ def design_ltr(
     ValueError
         If the plant is not of this kind, or a number not above 0.
     """
-    system = plant_system(plant)
+    system = state_space(*plant.state_space()) if isinstance(plant, RationalFit) else plant
     _check(system, bandwidth, control_weight)
     time = time_constant(system)
     scaled = state_space(time * system.A, time * system.B, system.C)
@@ -147,24 +133,13 @@ def integrator(gain: float = 1.0) -> StateSpace:
     return state_space([[0.0]], [1.0], [gain])
 
 
-def plant_system(plant: StateSpace | RationalFit) -> StateSpace:
-    """Return an identified plant as a linear system."""
-    return state_space(*plant.state_space()) if isinstance(plant, RationalFit) else plant
-
-
 def loop_figures(loop_response: Response, low: float = 1e-2, high: float = 1e4) -> LoopFigures:
     """Return the figures of a loop from its response to angular frequencies [rad/s].
 
-    The margins are those of python-control on the tabulated response. On a product of sampled
-    systems its own frequency grid misses the crossover (8.4 in place of 9.02 rad/s for the printed
-    controller at 10 ms), and a delay has no state-space form.
-
-    Parameters
-    ----------
-    loop_response : callable
-        From frequencies, shape (n,), to the loop's complex response.
-    low, high : float
-        Range of frequencies [rad/s]; ``low`` counts as static.
+    ``low`` and ``high`` [rad/s] limit the frequencies; ``low`` counts as static. The margins are
+    those of python-control on the tabulated response. On a product of sampled systems its own
+    frequency grid misses the crossover (8.4 in place of 9.02 rad/s for the printed controller at 10
+    ms), and a delay has no state-space form.
     """
     import control
 
@@ -178,19 +153,29 @@ def loop_figures(loop_response: Response, low: float = 1e-2, high: float = 1e4) 
     margins = np.radians((phases + 180.0) % 360.0 - 180.0)
     target = abs(closed[0]) / math.sqrt(2.0)
 
-    def excess(w: float) -> float:
+    def tracking(w: float) -> float:
         value = complex(loop_response(np.array([w]))[0])
-        return abs(value / (1.0 + value)) - target
+        return abs(value / (1.0 + value))
 
-    bands = _crossings_below(grid, excess, np.abs(closed) - target)
+    sizes = np.abs(closed)
+    falls = np.flatnonzero((sizes[:-1] >= target) & (sizes[1:] < target))
+    bands = [
+        brentq(lambda w: tracking(w) - target, grid[k], grid[k + 1], xtol=1e-12) for k in falls[:1]
+    ]
+    k = int(np.clip(np.argmax(sizes), 1, POINTS - 2))
+    peak = minimize_scalar(
+        lambda x: -tracking(math.exp(x)),
+        bounds=(math.log(grid[k - 1]), math.log(grid[k + 1])),
+        method="bounded",
+    )
     return LoopFigures(
         crossover=float(np.max(crossings)),
         phase_margin=float(np.min(margins)),
         delay_margin=float(np.min(margins / crossings)),
         gain_margin=float(np.min(gains[gains > 1.0], initial=math.inf)),
-        bandwidth=bands[0] if bands else math.inf,
+        bandwidth=float(bands[0]) if bands else math.inf,
         peak_sensitivity=1.0 / float(np.min(np.append(distances, np.abs(1.0 + loop)))),
-        peak_tracking=_peak(grid, np.abs(closed), lambda z: z / (1.0 + z), loop_response),
+        peak_tracking=max(float(-peak.fun), float(sizes[k])),
     )
 
 
@@ -246,22 +231,3 @@ def _check(plant: StateSpace, bandwidth: float, control_weight: float) -> None:
             f"a zero is at {unstable[0]:.4g}; the loop can be recovered only with zeros in the left"
             " half-plane: fit with fewer poles, or with a higher relative_degree"
         )
-
-
-def _crossings_below(grid: Array, function: Callable[[float], float], values: Array) -> list[float]:
-    """Return the zeros at which a function known on a grid becomes negative."""
-    found = np.flatnonzero((values[:-1] >= 0.0) & (values[1:] < 0.0))
-    return [float(brentq(function, grid[i], grid[i + 1], xtol=1e-12)) for i in found]
-
-
-def _peak(
-    grid: Array, sizes: Array, shape: Callable[[complex], complex], loop_response: Response
-) -> float:
-    """Return the largest magnitude of a function of the loop, refined about the grid's largest."""
-    k = int(np.clip(np.argmax(sizes), 1, len(grid) - 2))
-    best = minimize_scalar(
-        lambda x: -abs(shape(complex(loop_response(np.array([math.exp(x)]))[0]))),
-        bounds=(math.log(grid[k - 1]), math.log(grid[k + 1])),
-        method="bounded",
-    )
-    return max(float(-best.fun), float(sizes[k]))

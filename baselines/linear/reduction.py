@@ -11,26 +11,15 @@ smallest of those left; the square-root algorithm here is accurate to 0.05 % in 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.linalg import schur, solve_continuous_lyapunov, solve_sylvester
 
 from baselines.core.controller import Array
-from baselines.linear.systems import state_space
-
-if TYPE_CHECKING:
-    from control import StateSpace
+from baselines.linear.systems import StateSpace, state_space
 
 
 def residualised(system: StateSpace, order: int) -> tuple[StateSpace, Array]:
-    """Return a stable system with fewer states, and all Hankel singular values.
-
-    Raises
-    ------
-    ValueError
-        If the system is not stable, or does not have that many states.
-    """
+    """Return a stable system with fewer states, and all Hankel singular values."""
     import control
 
     slowest = np.max(system.poles().real)
@@ -65,11 +54,6 @@ def split(system: StateSpace, frequency: float) -> tuple[StateSpace, StateSpace]
     """Return the parts with poles within and beyond a frequency [rad/s], whose sum is the system.
 
     The feed-through goes to the second. (Ordered Schur form and a Sylvester equation.)
-
-    Raises
-    ------
-    ValueError
-        If all poles are on one side.
     """
     form, basis, k = schur(system.A, sort=lambda re, im: np.hypot(re, im) <= frequency)
     if not 0 < k < system.nstates:

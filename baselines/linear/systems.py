@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +18,9 @@ from scipy.linalg import matrix_balance
 from baselines.core.controller import Array
 
 if TYPE_CHECKING:
-    from control import StateSpace
+    import control
 
+StateSpace: TypeAlias = "control.StateSpace"
 Complex = NDArray[np.complex128]
 Method = Literal["bilinear", "zoh"]
 
@@ -99,15 +100,8 @@ class DiscreteSystem:
     """Systems ``x' = a x + b u``, ``y = c x + d u`` at a fixed period, one for each lane.
 
     A single system has no lane axis (``lanes`` is empty); the systems of all joints of an arm have
-    one. Inputs and outputs are of shape (..., *lanes), states of shape (..., *lanes, n).
-
-    Attributes
-    ----------
-    a : ndarray, shape (*lanes, n, n)
-    b, c : ndarray, shape (*lanes, n)
-    d : ndarray, shape lanes
-    period : float
-        [s].
+    one: ``a`` is of shape (*lanes, n, n), ``b`` and ``c`` of (*lanes, n), ``d`` of lanes. Inputs
+    and outputs are of shape (..., *lanes), states of (..., *lanes, n). The period is in s.
     """
 
     a: Array
@@ -121,6 +115,12 @@ class DiscreteSystem:
         """Return systems of one order and period as lanes of one."""
         a, b, c, d = (np.array([getattr(s, name) for s in systems]) for name in "abcd")
         return cls(a, b, c, d, systems[0].period)
+
+    @classmethod
+    def identity(cls, lanes: int, period: float) -> DiscreteSystem:
+        """Return lanes without states whose output is their input."""
+        none = np.zeros((lanes, 0))
+        return cls(none[..., None], none, none, np.ones(lanes), period)
 
     def scaled(self, inputs: float = 1.0, outputs: float = 1.0) -> DiscreteSystem:
         """Return the system with factors on its input and output, the states unchanged."""

@@ -9,18 +9,26 @@ counted. :func:`pam_envs.mechanics.redundancy.resolve` plans a whole path, and r
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, RowController, reader
-from baselines.core.entry import Entry
+from baselines.core.controller import (
+    Array,
+    Prediction,
+    Reader,
+    RowController,
+    encode_actions,
+    reader,
+)
+from baselines.core.entry import Entry, Spec
 from baselines.core.environments import ARM
 from pam_envs.mechanics.redundancy.resolution import LIMIT, Resolution, UnreachablePose, resolve
 from pam_envs.mechanics.serial_chain.chain import SerialChain
-from pam_envs.parameters import Signals
+from pam_envs.parameters import Signal
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 POSE = ("x", "y", "z", "point_x", "point_y", "point_z")
@@ -29,16 +37,10 @@ INSIDE = 0.999
 
 
 class PlanState(NamedTuple):
-    """Solution of the last period, one row an environment.
+    """Solution of the last period, first axis n_env.
 
-    Attributes
-    ----------
-    angles : ndarray, shape (rows, n)
-        Set-points [rad].
-    multipliers : ndarray, shape (rows, 5)
-        Lagrange multipliers of (2.2).
-    missed : ndarray, shape (rows,)
-        Poses out of reach so far.
+    Set-points [rad], Lagrange multipliers of (2.2), shape (n_env, 5), and the number of poses out
+    of reach so far.
     """
 
     angles: Array
@@ -46,79 +48,63 @@ class PlanState(NamedTuple):
     missed: Array
 
 
+@dataclass(frozen=True)
 class InverseKinematics(RowController):
     """Set-points of all joints for the reference pose, without feedback of the tool.
 
-    Parameters
-    ----------
-    chain : SerialChain
-        The nominal arm.
-    signals, actions : Signals
-        Of the environment: ``angle_k``, ``reference_x`` ... ``reference_point_z`` (and their
-        previews), and ``angle_set_point_k``.
-    limit : float
-        Largest angle of a joint [rad].
-    weighted : bool
-        Whether the weight (2.1) or the sum of squares is minimised.
-    preview : int
-        Index of the preview sample of the pose; 0 is the present one.
+    ``sensed`` reads ``angle_k``, ``reference`` reads ``reference_x`` ... ``reference_point_z``; the
+    limit is the largest angle of a joint [rad]; ``weighted``: whether the weight (2.1) or the sum
+    of squares is minimised.
     """
 
-    def __init__(
-        self,
-        chain: SerialChain,
-        signals: Signals,
-        actions: Signals,
-        limit: float = LIMIT,
-        weighted: bool = True,
-        preview: int = 0,
-    ) -> None:
-        self.chain, self.limit, self.weighted = chain, limit, weighted
-        joints = range(chain.stages)
-        tail = f"_{preview}" if preview else ""
-        self._sensed = reader(signals, [f"angle_{k}" for k in joints])
-        self._reference = reader(signals, [f"reference_{name}{tail}" for name in POSE])
-        scales = [actions[f"angle_set_point_{k}"].scale for k in joints]
-        self._gain, self._offset = np.array(scales).T
+    chain: SerialChain
+    sensed: Reader
+    reference: Reader
+    actions: Sequence[Signal]
+    limit: float = LIMIT
+    weighted: bool = True
 
     def initial_state(self, observation: ArrayLike) -> PlanState:
         """Return the state at the sensed angles, within the limit."""
-        sensed = self._sensed.rows(observation).T
-        edge = INSIDE * self.limit
+        sensed, edge = self.sensed.rows(observation).T, INSIDE * self.limit
         rows = len(sensed)
         return PlanState(np.clip(sensed, -edge, edge), np.zeros((rows, 5)), np.zeros(rows))
 
     def respond(self, observation: ArrayLike, state: PlanState) -> Prediction:
-        """See :class:`~baselines.core.controller.RowController`."""
-        poses = self._reference.rows(observation).T
-        after = self.plan(poses, state)
-        action = (self._gain * after.angles + self._offset).astype(np.float32)
-        return (action if np.ndim(observation) == 2 else action[0]), after
-
-    def plan(self, poses: Array, state: PlanState) -> PlanState:
-        """Return the state with set-points for poses, shape (rows, 6)."""
+        """Return the action and the next state."""
         angles, multipliers, missed = (np.array(part) for part in state)
-        for i, pose in enumerate(poses):
-            if not np.any(pose[3:]):
+        for i, pose in enumerate(self.reference.rows(observation).T):
+            found = self._resolve(pose, angles[i], multipliers[i])
+            if found is None:
                 missed[i] += 1
-                continue
-            try:
-                found = self._resolve(pose, angles[i], multipliers[i])
-            except UnreachablePose:
-                missed[i] += 1
-                continue
-            angles[i], multipliers[i] = found.angles[0], found.multipliers[0]
-        return PlanState(angles, multipliers, missed)
+            else:
+                angles[i], multipliers[i] = found.angles[0], found.multipliers[0]
+        after = PlanState(angles, multipliers, missed)
+        return encode_actions(self.actions, angles.T, observation), after
 
-    def _resolve(self, pose: Array, start: Array, multipliers: Any) -> Resolution:
-        return resolve(self.chain, pose[None], self.limit, self.weighted, start, multipliers)
+    def _resolve(self, pose: Array, start: Array, multipliers: Any) -> Resolution | None:
+        """Return the set-points of a pose, None out of reach or without a direction."""
+        if not np.any(pose[3:]):
+            return None
+        try:
+            return resolve(self.chain, pose[None], self.limit, self.weighted, start, multipliers)
+        except UnreachablePose:
+            return None
 
 
 def make_inverse_kinematics(
-    plant: RedundantManipulator, signals: Signals, action_signals: Signals
+    spec: Spec[RedundantManipulator], weighted: bool = True, preview: int = 0
 ) -> InverseKinematics:
-    """Return the controller for the chain and the range of angles of a nominal arm."""
-    return InverseKinematics(plant.chain, signals, action_signals, plant.angle_range[1])
+    """Return the controller; ``preview`` is the index of the pose's sample, 0 the present one."""
+    joints, tail = range(spec.plant.chain.stages), f"_{preview}" if preview else ""
+    return InverseKinematics(
+        spec.plant.chain,
+        reader(spec.signals, [f"angle_{k}" for k in joints]),
+        reader(spec.signals, [f"reference_{name}{tail}" for name in POSE]),
+        tuple(spec.actions[f"angle_set_point_{k}"] for k in joints),
+        spec.plant.angle_range[1],
+        weighted,
+    )
 
 
 ENTRIES = {
@@ -133,14 +119,8 @@ ENTRIES = {
 }
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Plans of a path with the weight (2.1) and with the smallest angles.
-
-    Attributes
-    ----------
-    unweighted, weighted : Resolution
-    """
+class Comparison(NamedTuple):
+    """Plans of a path with the weight (2.1) and with the smallest angles."""
 
     unweighted: Resolution
     weighted: Resolution

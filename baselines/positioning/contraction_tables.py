@@ -2,8 +2,7 @@
 
 positioning2021 programs a proportional regulator with six cubics p(x), one for each load and
 direction (Eqs. 7 to 12): here exactly as printed, refitted with care, and compared with other
-curves through the same readings. Each inverse has ``pressure(contraction, inflating, load)`` in SI,
-element by element over arrays.
+curves through the same readings.
 
 Between the measured loads the pressure is interpolated linearly; loads outside their range count as
 the nearest one. Both are assumed: the paper measured three loads only. Pressures may exceed the
@@ -16,19 +15,19 @@ inflation: the order of Equations 1 to 6 and 7 to 12. Positioning errors:
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache, partial
-from typing import Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from baselines.core.controller import Array
 from pam_envs.data.tables import BAR, MM, ContractionTable, load_contraction_table
 
-Array = NDArray[np.float64]
-Curve = Callable[[Array], Array]
+Curve = Callable[[Array], Any]
 
 LOADS = (0.0, 2.55, 4.55)
 """The loads [kg] of the paper's equations."""
@@ -79,209 +78,112 @@ TABLE_6_CORRECTION = 2.05
 """Its value interpolated from the readings of Table 5 [bar]."""
 
 
-class ContractionInverse(Protocol):
-    """Pressure as a function of contraction, branch and load."""
+@dataclass(frozen=True, eq=False)
+class BranchCurves:
+    """Pressure as a function of contraction, branch and load.
 
-    def pressure(self, contraction: ArrayLike, inflating: ArrayLike, load: ArrayLike) -> Array:
-        """Return the pressure to command.
+    ``curves[load][branch]`` gives [bar] of [mm], element by element; the loads [kg] ascend.
+    """
 
-        Parameters
-        ----------
-        contraction : array_like of float
-            Desired contraction [m].
-        inflating : array_like of bool
-            Whether the muscle comes from less contraction.
-        load : array_like of float
-            Hanging mass [kg].
+    loads: tuple[float, ...]
+    curves: Sequence[Sequence[Curve]]
 
-        Returns
-        -------
-        ndarray
-            Pressure [Pa], of the shape to which the arguments broadcast, not clipped.
+    def __call__(self, contraction: ArrayLike, inflating: ArrayLike, load: ArrayLike) -> Array:
+        """Return the pressure [Pa], not clipped, of the shape to which the arguments broadcast.
+
+        For a desired contraction [m], whether the muscle comes from less, and a hanging mass [kg].
         """
-        ...
+        inflates, at = np.asarray(inflating, bool), np.asarray(load, float)
+        scaled = np.asarray(contraction, float) / MM
+        total: Array = np.zeros(())
+        for (up, down), unit in zip(self.curves, np.eye(len(self.loads)), strict=True):
+            hat = np.interp(at, self.loads, unit)  # 1 at the curves' own load, 0 at the others
+            total = total + hat * np.where(inflates, up(scaled), down(scaled))
+        return BAR * total
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class PolynomialInverse:
-    """Polynomials p(x), one for each load and branch.
+def polynomials(loads: tuple[float, ...], coefficients: Array, spans: Array | None) -> BranchCurves:
+    """Return polynomials, coefficients of shape (n_loads, 2, degree + 1).
 
-    Attributes
-    ----------
-    loads : tuple of float
-        Ascending [kg].
-    coefficients : ndarray, shape (n_loads, 2, degree + 1)
-        [bar] of [mm], highest power first.
-    span : ndarray, shape (n_loads, 2, 2), optional
-        Lowest and highest contraction [mm] of the readings behind each polynomial. Contractions
-        outside are clipped, since high powers extrapolate badly. Default: no limits.
+    Contractions outside ``spans``, shape (n_loads, 2, 2) [mm], are clipped, since high powers
+    extrapolate badly; None for no limits.
     """
-
-    loads: tuple[float, ...]
-    coefficients: Array
-    span: Array | None = None
-
-    def pressure(self, contraction: ArrayLike, inflating: ArrayLike, load: ArrayLike) -> Array:
-        """See :meth:`ContractionInverse.pressure`."""
-        return BAR * _between_loads(self.loads, self._curve, _in_mm(contraction), inflating, load)
-
-    def _curve(self, load: int, branch: int, contraction: Array) -> Array:
-        if self.span is not None:
-            contraction = np.clip(contraction, *self.span[load, branch])
-        return np.asarray(np.polyval(self.coefficients[load, branch], contraction))
+    limits = np.full((*coefficients.shape[:2], 2), [-np.inf, np.inf]) if spans is None else spans
+    return BranchCurves(
+        loads,
+        [
+            [partial(_polynomial, *branch) for branch in zip(*load, strict=True)]
+            for load in zip(coefficients, limits, strict=True)
+        ],
+    )
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class CurveInverse:
-    """Monotone curves p(x), one for each load and branch, held at their ends.
-
-    Attributes
-    ----------
-    loads : tuple of float
-        Ascending [kg].
-    curves : tuple of tuple of callable
-        ``curves[load][branch]`` gives [bar] of [mm], element by element.
-    """
-
-    loads: tuple[float, ...]
-    curves: tuple[tuple[Curve, ...], ...]
-
-    def pressure(self, contraction: ArrayLike, inflating: ArrayLike, load: ArrayLike) -> Array:
-        """See :meth:`ContractionInverse.pressure`."""
-        return BAR * _between_loads(self.loads, self._curve, _in_mm(contraction), inflating, load)
-
-    def _curve(self, load: int, branch: int, contraction: Array) -> Array:
-        return self.curves[load][branch](contraction)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class ForwardPolynomials:
-    """Polynomials x(p), one for each load and branch.
-
-    Attributes
-    ----------
-    loads : tuple of float
-        Ascending [kg].
-    coefficients : ndarray, shape (n_loads, 2, degree + 1)
-        [mm] of [bar], highest power first.
-    """
-
-    loads: tuple[float, ...]
-    coefficients: Array
-
-    def contraction(self, pressure: ArrayLike, inflating: ArrayLike, load: ArrayLike) -> Array:
-        """Return the contraction [m] at a pressure [Pa], of the shape the arguments broadcast to.
-
-        Parameters
-        ----------
-        pressure : array_like of float
-            [Pa].
-        inflating : array_like of bool
-            Whether the pressure is being raised.
-        load : array_like of float
-            Hanging mass [kg]; between loads as for the inverses.
-        """
-        bars = np.asarray(pressure, float) / BAR
-        return MM * _between_loads(self.loads, self._curve, bars, inflating, load)
-
-    def _curve(self, load: int, branch: int, pressure: Array) -> Array:
-        return np.asarray(np.polyval(self.coefficients[load, branch], pressure))
-
-
-def published_inverse() -> PolynomialInverse:
+def published_inverse() -> BranchCurves:
     """Return Equations 7 to 12 exactly as printed, misprints included."""
-    return PolynomialInverse(LOADS, PUBLISHED_INVERSE)
+    return polynomials(LOADS, PUBLISHED_INVERSE, None)
 
 
-def table_6_pressures(*, corrected: bool = True) -> Array:
-    """Return the pressures [bar] of Table 6, shape (3, 2, 7), with or without its one error."""
+def table_6_cubics(*, corrected: bool = True) -> Array:
+    """Return the coefficients, (3, 2, 4), of cubics through Table 6 in full precision.
+
+    ``corrected=False`` keeps the 1.43 bar of 4.55 kg, inflation, 2 mm in place of 2.05 bar, which
+    reproduces the paper's coefficients and coefficient of determination.
+    """
     pressures = TABLE_6_PRESSURE.copy()
     if corrected:
         pressures[TABLE_6_ERROR] = TABLE_6_CORRECTION
-    return pressures
+    return np.array([[np.polyfit(TABLE_6_CONTRACTION, p, 3) for p in load] for load in pressures])
 
 
-def table_6_inverse(*, corrected: bool = True) -> PolynomialInverse:
-    """Return Equations 7 to 12 refitted: cubics through Table 6 in full precision.
-
-    Parameters
-    ----------
-    corrected : bool
-        True replaces the 1.43 bar of 4.55 kg, inflation, 2 mm by 2.05 bar; False keeps it, which
-        reproduces the paper's coefficients and coefficient of determination.
-    """
-    pressures = table_6_pressures(corrected=corrected)
-    fits = [[np.polyfit(TABLE_6_CONTRACTION, p, 3) for p in load] for load in pressures]
-    return PolynomialInverse(LOADS, np.array(fits))
+def table_6_inverse(*, corrected: bool = True) -> BranchCurves:
+    """Return Equations 7 to 12 refitted: see :func:`table_6_cubics`."""
+    return polynomials(LOADS, table_6_cubics(corrected=corrected), None)
 
 
-def polynomial_inverse(table: ContractionTable | None = None, degree: int = 3) -> PolynomialInverse:
-    """Return least-squares polynomials p(x) through the single readings of each load and branch.
-
-    Parameters
-    ----------
-    table : ContractionTable, optional
-        Default: the published readings.
-    degree : int
-        3 for the paper's kind of curve.
-    """
-    table = _default(table)
+def polynomial_inverse(table: ContractionTable | None = None, degree: int = 3) -> BranchCurves:
+    """Return least-squares polynomials p(x) through the single readings of each load and branch."""
+    table = table or _published_table()
     clouds = [[_cloud(table, load, branch) for branch in BRANCHES] for load in table.loads]
-    fits = [[np.polyfit(x, p, degree) for x, p in load] for load in clouds]
-    span = [[(x.min(), x.max()) for x, _ in load] for load in clouds]
-    return PolynomialInverse(table.loads, np.array(fits), np.array(span))
+    return _fitted(table, clouds, degree)
 
 
-def quintic_inverse(table: ContractionTable | None = None) -> PolynomialInverse:
-    """Return :func:`polynomial_inverse` of degree 5."""
-    return polynomial_inverse(table, 5)
-
-
-def one_cubic_inverse(table: ContractionTable | None = None) -> PolynomialInverse:
+def one_cubic_inverse(table: ContractionTable | None = None) -> BranchCurves:
     """Return one cubic p(x) a load for both branches, without hysteresis.
 
-    Parameters
-    ----------
-    table : ContractionTable, optional
-        Default: the published readings. The common turning point counts in both branches.
+    The common turning point counts in both branches.
     """
-    table = _default(table)
-    fits, spans = [], []
-    for load in table.loads:
-        x, p = np.hstack([_cloud(table, load, branch) for branch in BRANCHES])
-        fits.append([np.polyfit(x, p, 3)] * 2)
-        spans.append([(x.min(), x.max())] * 2)
-    return PolynomialInverse(table.loads, np.array(fits), np.array(spans))
+    table = table or _published_table()
+    clouds = [np.hstack([_cloud(table, load, b) for b in BRANCHES]) for load in table.loads]
+    return _fitted(table, [[cloud, cloud] for cloud in clouds], 3)
 
 
-def published_forward() -> ForwardPolynomials:
-    """Return Equations 1 to 6 exactly as printed, misprints included."""
-    return ForwardPolynomials(LOADS, PUBLISHED_FORWARD)
+def fitted_forward(table: ContractionTable | None = None) -> Array:
+    """Return the coefficients, (n_loads, 2, 4), of Equations 1 to 6 refitted to mean readings."""
+    table = table or _published_table()
+    means = [[_mean_curve(table, load, b) for b in BRANCHES] for load in table.loads]
+    return np.array([[np.polyfit(*mean, 3) for mean in load] for load in means])
 
 
-def fitted_forward(table: ContractionTable | None = None) -> ForwardPolynomials:
-    """Return least-squares cubics x(p) through the mean readings: Equations 1 to 6 refitted."""
-    table = _default(table)
-    fits = [[np.polyfit(*_mean_curve(table, load, b), 3) for b in BRANCHES] for load in table.loads]
-    return ForwardPolynomials(table.loads, np.array(fits))
-
-
-def forward_cubic_inverse(table: ContractionTable | None = None) -> CurveInverse:
+def forward_cubic_inverse(table: ContractionTable | None = None) -> BranchCurves:
     """Return the inverse of :func:`fitted_forward` over 0 to 6 bar.
 
     Where a cubic decreases (4.55 kg inflating below 0.4 bar, 0 kg deflating at the top), its
-    running maximum is used.
+    running maximum is used, linear between steps of 0.001 bar.
     """
-    forward = fitted_forward(table)
-    curves = [[_inverted(fit) for fit in load] for load in forward.coefficients]
-    return CurveInverse(forward.loads, tuple(tuple(load) for load in curves))
+    table, pressure = table or _published_table(), np.linspace(0.0, TOP, 6001)
+    rising = [
+        [np.maximum.accumulate(np.polyval(cubic, pressure)) for cubic in load]
+        for load in fitted_forward(table)
+    ]
+    curves = [[partial(np.interp, xp=x, fp=pressure) for x in load] for load in rising]
+    return BranchCurves(table.loads, curves)
 
 
-def pchip_inverse(table: ContractionTable | None = None) -> CurveInverse:
+def pchip_inverse(table: ContractionTable | None = None) -> BranchCurves:
     """Return monotone piecewise cubics p(x) through the mean readings of each load and branch."""
-    table = _default(table)
+    table = table or _published_table()
     curves = [[_pchip(*_mean_curve(table, load, b)) for b in BRANCHES] for load in table.loads]
-    return CurveInverse(table.loads, tuple(tuple(load) for load in curves))
+    return BranchCurves(table.loads, curves)
 
 
 @cache
@@ -289,12 +191,11 @@ def _published_table() -> ContractionTable:
     return load_contraction_table()
 
 
-def _default(table: ContractionTable | None) -> ContractionTable:
-    return _published_table() if table is None else table
-
-
-def _in_mm(contraction: ArrayLike) -> Array:
-    return np.asarray(contraction, float) / MM
+def _fitted(table: ContractionTable, clouds: Sequence[Sequence[Any]], degree: int) -> BranchCurves:
+    """Return polynomials through clouds of (contraction, pressure), within their contractions."""
+    fits = [[np.polyfit(x, p, degree) for x, p in load] for load in clouds]
+    spans = [[(x.min(), x.max()) for x, _ in load] for load in clouds]
+    return polynomials(table.loads, np.array(fits), np.array(spans))
 
 
 def _cloud(table: ContractionTable, load: float, inflating: bool) -> tuple[Array, Array]:
@@ -310,42 +211,12 @@ def _mean_curve(table: ContractionTable, load: float, inflating: bool) -> tuple[
     return pressure[order] / BAR, contraction.mean(axis=1)[order] / MM
 
 
-def _inverted(coefficients: Array) -> Curve:
-    """Return p(x) of the running maximum of a polynomial x(p), linear between 0.001 bar steps."""
-    pressure = np.linspace(0.0, TOP, 6001)
-    contraction = np.maximum.accumulate(np.polyval(coefficients, pressure))
-    return partial(_between_points, contraction, pressure)
-
-
-def _between_points(contraction: Array, pressure: Array, target: Array) -> Array:
-    return np.interp(target, contraction, pressure)
+def _polynomial(coefficients: Array, span: Array, contraction: Array) -> Array:
+    return np.asarray(np.polyval(coefficients, np.clip(contraction, *span)))
 
 
 def _pchip(pressure: Array, contraction: Array) -> Curve:
-    """Return the monotone interpolant p(x); means that do not increase are left out."""
+    """Return the monotone interpolant p(x), held at its ends; falling means are left out."""
     rising = np.r_[True, contraction[1:] > np.maximum.accumulate(contraction)[:-1]]
-    return partial(_held, PchipInterpolator(contraction[rising], pressure[rising]))
-
-
-def _held(curve: PchipInterpolator, target: Array) -> Array:
-    """Return the interpolant within its readings and its end values beyond."""
-    return np.asarray(curve(np.clip(target, curve.x[0], curve.x[-1])))
-
-
-def _between_loads(
-    loads: tuple[float, ...],
-    curve: Callable[[int, int, Array], Array],
-    argument: Array,
-    inflating: ArrayLike,
-    load: ArrayLike,
-) -> Array:
-    """Return the curves' values, interpolated between neighbouring loads, element by element."""
-    inflates = np.asarray(inflating, bool)
-    values = [
-        np.where(inflates, curve(row, 0, argument), curve(row, 1, argument))
-        for row in range(len(loads))
-    ]
-    # Hat functions: 1 at their own load, 0 at the others, the nearest load beyond the ends.
-    at = np.asarray(load, float)
-    hats = (np.interp(at, loads, unit) for unit in np.eye(len(loads)))
-    return np.asarray(sum(hat * value for hat, value in zip(hats, values, strict=True)))
+    curve = PchipInterpolator(contraction[rising], pressure[rising])
+    return lambda target: np.asarray(curve(np.clip(target, curve.x[0], curve.x[-1])))

@@ -18,6 +18,8 @@ target when the travel time to it exceeds ``EARLY`` times the remaining time.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -32,12 +34,13 @@ from baselines.core.controller import (
     RowController,
     encode_action,
     preview_names,
+    preview_weights,
     reader,
 )
-from baselines.core.entry import Entry
-from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
+from baselines.core.entry import Entry, Spec
+from baselines.core.knobs import Bounds
 from baselines.positioning.nominal import HysteresisState, Nominal
-from pam_envs.parameters import Signal, Signals
+from pam_envs.parameters import Signal
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 HORIZON = 0.02
@@ -49,61 +52,21 @@ KNOBS: Bounds = {"horizon": (0.5, 4.0), "lead": (0.5, 2.0), "early": (0.5, 2.0)}
 
 
 class InverseState(NamedTuple):
-    """State of the nominal muscle.
-
-    Attributes
-    ----------
-    pressure : ndarray, shape (n_env,)
-        Nominal pressure [Pa] one dead time later.
-    drive : ndarray, shape (n_env,)
-        Nominal effective pressure [Pa] then.
-    hysteresis : tuple of ndarray, first axis n_env
-        Nominal hysteresis then.
-    """
+    """Nominal pressure and effective pressure [Pa] and hysteresis, one dead time later."""
 
     pressure: Array
     drive: Array
     hysteresis: HysteresisState
 
 
-def preview_weights(samples: int, spacing: float, lead: float) -> Array:
-    """Return weights of the reference and its preview that give the reference at a later time.
-
-    Parameters
-    ----------
-    samples : int
-        Number of preview samples; 0 gives the weight 1 for the present reference.
-    spacing : float
-        Time [s] between them; linear interpolation.
-    lead : float
-        The later time [s]; clipped to the preview horizon.
-
-    Returns
-    -------
-    ndarray, shape (samples + 1,)
-        They add up to 1.
-    """
-    nodes = spacing * np.arange(samples + 1)
-    return np.array([np.interp(lead, nodes, row) for row in np.eye(samples + 1)])
-
-
 @dataclass(frozen=True)
 class Inverse(RowController):
     """Exact inverse of the nominal muscle; see the module.
 
-    Attributes
-    ----------
-    nominal : Nominal
-    reader : Reader
-        Of contraction, set-point, load, reference and its preview.
-    action_signal : Signal
-    aims : ndarray, shape (n_aims, n_preview + 1)
-        Weights of reference and preview of each target, the nearest first.
-    due : ndarray, shape (n_aims,)
-        Travel time [s] from which a target replaces the earlier ones.
-    horizon : float
-        Time [s], above 0, in which the set-point would take the nominal pressure to its
-        target: the regulator's inverse. A longer horizon smooths the set-point.
+    The signals read are contraction, set-point, load, reference and its preview. ``aims``, shape
+    (n_aims, n_preview + 1), holds the weights of each target, the nearest first, and ``due`` the
+    travel time [s] from which it replaces the earlier ones. The set-point would take the nominal
+    pressure to its target within ``horizon`` [s], above 0: a longer one smooths it.
     """
 
     nominal: Nominal
@@ -111,18 +74,19 @@ class Inverse(RowController):
     action_signal: Signal
     aims: Array
     due: Array
-    horizon: float = HORIZON
+    horizon: float
 
     @cached_property
     def _lag_gain(self) -> float:
-        return 1.0 / self.nominal.arrival(self.horizon)
+        """Inverse of the share of a step that the regulator completes in the horizon."""
+        return -1.0 / math.expm1(-self.horizon / self.nominal.plant.regulator.time_constant)
 
     def initial_state(self, observation: ArrayLike) -> InverseState:
-        """See :class:`~baselines.core.controller.RowController`."""
+        """Return the state that explains the first measurement."""
         return self.explaining_state(self.reader.rows(observation))
 
     def respond(self, observation: ArrayLike, now: InverseState) -> Prediction:
-        """See :class:`~baselines.core.controller.RowController`."""
+        """Return the action and the next state."""
         measured = self.reader.rows(observation)
         set_point = self.feed_forward(measured, now)
         after = self.advance(now, set_point, measured[2])
@@ -188,51 +152,25 @@ def _placed(whole: Any, part: HysteresisState, rows: Any, n: int) -> HysteresisS
     return tuple(whole)
 
 
-def aims_of(samples: int, spacing: float, lead: float, early: float = EARLY) -> tuple[Array, Array]:
-    """Return the targets of :class:`Inverse` and their due times, for a preview."""
-    aims, due = [preview_weights(samples, spacing, lead)], [0.0]
-    for i in range(1, samples + 1):
-        left = i * spacing - lead
-        if left > 0.0:
-            aims.append(np.eye(samples + 1)[i])
-            due.append(early * left)
-    return np.array(aims), np.array(due)
+def aims_of(times: Sequence[float], lead: float, early: float = EARLY) -> tuple[Array, Array]:
+    """Return the targets of :class:`Inverse` and their due times, for samples at times [s]."""
+    later = [k for k, time in enumerate(times) if time > lead]
+    aims = [preview_weights(times, lead), *np.eye(len(times))[later]]
+    return np.array(aims), np.array([0.0, *(early * (times[k] - lead) for k in later)])
 
 
-def make_inverse(
-    plant: SingleMuscle,
-    signals: Signals,
-    action_signals: Signals,
-    preview: bool = True,
-    horizon: float = HORIZON,
-    knobs: Knobs = AS_DESIGNED,
-) -> Inverse:
-    """Return the controller for a nominal plant.
-
-    Parameters
-    ----------
-    plant : SingleMuscle
-        Nominal plant.
-    signals, action_signals : Signals
-    preview : bool
-        Whether the reference is previewed.
-    horizon : float
-        See :class:`Inverse`.
-    knobs : mapping
-        Of ``KNOBS``: factors on the horizon, on the lead, and on ``EARLY``.
-    """
-    nominal = Nominal(plant)
-    references = preview_names("reference", signals) if preview else ["reference"]
-    samples = len(references) - 1
-    horizon = knob(knobs, "horizon") * horizon
-    delay = plant.regulator.dead_time + horizon + nominal.mechanical_lag
-    lead, early = knob(knobs, "lead") * delay, knob(knobs, "early") * EARLY
-    spacing = signals["reference_1"].ahead if samples else 0.0
-    aims, due = aims_of(samples, spacing, lead, early)
+def make_inverse(spec: Spec[SingleMuscle], preview: bool = True) -> Inverse:
+    """Return the controller; ``preview``: whether the reference is previewed."""
+    nominal = Nominal(spec.plant)
+    references = preview_names("reference", spec.signals) if preview else ["reference"]
+    horizon = spec.knob("horizon") * HORIZON
+    delay = spec.plant.regulator.dead_time + horizon + nominal.mechanical_lag
+    times = [spec.signals[name].ahead for name in references]
+    aims, due = aims_of(times, spec.knob("lead") * delay, spec.knob("early") * EARLY)
     return Inverse(
         nominal,
-        reader(signals, ["contraction", "set_point", "load", *references]),
-        action_signals["pressure_set_point"],
+        reader(spec.signals, ["contraction", "set_point", "load", *references]),
+        spec.actions["pressure_set_point"],
         aims,
         due,
         horizon,

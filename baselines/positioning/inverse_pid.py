@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Prediction, RowController, encode_action
-from baselines.core.entry import Entry
-from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
-from baselines.linear.simc import PID_KNOBS
-from baselines.positioning.inverse import HORIZON, Inverse, InverseState, make_inverse
+from baselines.core.entry import Spec
+from baselines.core.knobs import Bounds
+from baselines.linear.pid import PID_KNOBS, Gains, PidState, pid_start, pid_step
+from baselines.positioning.inverse import INVERSE, Inverse, InverseState, make_inverse
 from baselines.positioning.inverse import KNOBS as INVERSE_KNOBS
-from baselines.positioning.pid import Gains, PidState, pid_start, pid_step, simc
-from pam_envs.parameters import Signals
+from baselines.positioning.pid import simc
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 KNOBS: Bounds = {**INVERSE_KNOBS, "closed_loop_time": PID_KNOBS["closed_loop_time"]}
@@ -32,12 +31,8 @@ KNOBS: Bounds = {**INVERSE_KNOBS, "closed_loop_time": PID_KNOBS["closed_loop_tim
 class InversePidState(NamedTuple):
     """States of the feedforward and of the PID, and the delayed nominal contraction.
 
-    Attributes
-    ----------
-    inverse : InverseState
-    pid : PidState
-    expected : ndarray, shape (n_env, n_delay)
-        Nominal static contraction [m] under the pressures of the last periods, newest first.
+    ``expected``, shape (n_env, n_delay), is the nominal static contraction [m] under the pressures
+    of the last periods, newest first.
     """
 
     inverse: InverseState
@@ -47,13 +42,7 @@ class InversePidState(NamedTuple):
 
 @dataclass(frozen=True)
 class InversePid(RowController):
-    """Feedforward and PID; see the module.
-
-    Attributes
-    ----------
-    inverse : Inverse
-    gains : Gains
-    """
+    """Feedforward and PID; see the module."""
 
     inverse: Inverse
     gains: Gains
@@ -67,7 +56,7 @@ class InversePid(RowController):
         return int(age), age - int(age)
 
     def initial_state(self, observation: ArrayLike) -> InversePidState:
-        """See :class:`~baselines.core.controller.RowController`."""
+        """Return the state that explains the first measurement."""
         measured = self.inverse.reader.rows(observation)
         inverse = self.inverse.explaining_state(measured)
         expected = self._at_rest(inverse, measured[2])
@@ -78,22 +67,15 @@ class InversePid(RowController):
         )
 
     def respond(self, observation: ArrayLike, now: InversePidState) -> Prediction:
-        """See :class:`~baselines.core.controller.RowController`."""
+        """Return the action and the next state."""
         measured = self.inverse.reader.rows(observation)
         contraction, load = measured[0], measured[2]
         forward = self.inverse.feed_forward(measured, now.inverse)
         whole, part = self._delay
         expected = (1.0 - part) * now.expected[:, whole] + part * now.expected[:, whole + 1]
-        signal = self.inverse.action_signal
-        correction, pid = pid_step(
-            self.gains,
-            now.pid,
-            expected - contraction,
-            contraction - expected,
-            signal.low - forward,
-            signal.high - forward,
-            self.inverse.nominal.plant.control_period,
-        )
+        signal, period = self.inverse.action_signal, self.inverse.nominal.plant.control_period
+        error, low, high = expected - contraction, signal.low - forward, signal.high - forward
+        correction, pid = pid_step(self.gains, now.pid, error, -error, low, high, period)
         inverse = self.inverse.advance(now.inverse, forward, load)
         newest = self._at_rest(inverse, load)[:, None]
         after = InversePidState(inverse, pid, np.hstack([newest, now.expected[:, :-1]]))
@@ -107,27 +89,12 @@ class InversePid(RowController):
         return value
 
 
-def make_inverse_pid(
-    plant: SingleMuscle,
-    signals: Signals,
-    action_signals: Signals,
-    preview: bool = True,
-    horizon: float = HORIZON,
-    gains: Gains | None = None,
-    knobs: Knobs = AS_DESIGNED,
-) -> InversePid:
-    """Return the controller; parameters as of ``make_inverse`` and ``make_pid``."""
-    inverse = make_inverse(plant, signals, action_signals, preview, horizon, knobs)
-    return InversePid(inverse, simc(plant, knobs=knobs) if gains is None else gains)
+def make_inverse_pid(spec: Spec[SingleMuscle], preview: bool = True) -> InversePid:
+    """Return the controller; see :func:`~baselines.positioning.inverse.make_inverse`."""
+    return InversePid(make_inverse(spec, preview), simc(spec.plant, knobs=spec.knobs))
 
 
-INVERSE_PID = partial(
-    Entry,
-    knowledge="nominal model",
-    feedback=True,
-    citation="krejci2001; mayergoyz1991; skogestad2003",
-    plants=(SingleMuscle,),
-)
+INVERSE_PID = partial(INVERSE, feedback=True, citation="krejci2001; mayergoyz1991; skogestad2003")
 ENTRIES = {
     "inverse_pid_no_preview": INVERSE_PID(
         "inverse_no_preview, and a PID on the deviation from the nominal muscle",

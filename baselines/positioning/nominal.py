@@ -8,9 +8,9 @@ inverse, static curve) is prepared when that load first occurs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -76,9 +76,8 @@ class LoadedMuscle:
     def explain(self, contraction: Array, pressure: Array) -> HysteresisState:
         """Return the hysteresis state of the simplest history of a first measurement.
 
-        That history is: from no pressure up to a peak, and down to the present pressure. A
-        higher peak leaves more contraction; it is found by bisection between the present and the
-        full pressure, and clipped to these.
+        From no pressure up to a peak, and down to the present pressure. A higher peak leaves more
+        contraction; it is found by bisection between the present and the full pressure.
         """
         target = self.drive_for(contraction)
         low = np.array(pressure, float)
@@ -96,32 +95,19 @@ class LoadedMuscle:
 
 @dataclass(frozen=True)
 class Nominal:
-    """Nominal plant over rows, each with its own load.
-
-    Attributes
-    ----------
-    plant : SingleMuscle
-        Nominal plant.
-    """
+    """Nominal plant over rows, each with its own load."""
 
     plant: SingleMuscle
 
     @cached_property
-    def _met(self) -> dict[float, LoadedMuscle]:
-        return {}
-
-    def at(self, load: float) -> LoadedMuscle:
-        """Return the plant with a load [kg], cached."""
-        if load not in self._met:
-            self._met[load] = LoadedMuscle(self.plant, load)
-        return self._met[load]
+    def at(self) -> Callable[[float], LoadedMuscle]:
+        """From a load [kg] to the plant with it, cached."""
+        return cache(partial(LoadedMuscle, self.plant))
 
     def groups(self, load: Array) -> Iterator[tuple[LoadedMuscle, Any]]:
         """Yield each load's plant with the index of its rows."""
         for key, rows in group_by_load(load):
             yield self.at(key), rows
-
-    # --- constants of the motion ------------------------------------------------------------
 
     @cached_property
     def mechanical_lag(self) -> float:
@@ -156,7 +142,3 @@ class Nominal:
         ramp = np.minimum(np.maximum(ramp, 0.0), period)
         left = (size - law.slew_rate * ramp) * np.exp((ramp - period) / law.time_constant)
         return np.asarray(set_point - np.copysign(left, gap))
-
-    def arrival(self, seconds: float) -> float:
-        """Return the share of a step that the regulator completes in a time [s]."""
-        return -math.expm1(-seconds / self.plant.regulator.time_constant)

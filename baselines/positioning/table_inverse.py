@@ -1,8 +1,8 @@
 """Open-loop positioning from measured tables: one pressure curve for each load and branch.
 
 The method of positioning2021: curves p(contraction), one for inflation and one for deflation at
-each load; the set-point is the curve of the present branch (:mod:`baselines.positioning.branch`) at
-the present reference. Nothing is measured after the start. The curves are
+each load; the set-point is the curve of the present branch at the present reference. Nothing is
+measured after the start. The curves are
 
 - monotone piecewise cubics through the mean readings, without fitting error ("table");
 - the six published cubics (Eqs. 7 to 12) exactly as printed ("plc_as_printed"): some coefficients
@@ -12,14 +12,24 @@ the present reference. Nothing is measured after the start. The curves are
   inflation, 2 mm) replaced by the value of Table 5 ("plc_refitted");
 - one cubic a load for both branches ("one_cubic"), and a straight line a load ("linear"): without
   hysteresis.
+
+The reference alone determines the branch, as in a programmable logic controller: it changes when
+the reference has reversed by more than a dead band from the extremum since the last change. A held
+reference keeps its branch, a step selects the right one at once, and a slow ramp does after the
+dead band; sensor noise has no influence.
+
+Limitation: after a small reversal, wider than the dead band, the curve jumps from one branch of the
+*major* loop to the other, though the muscle has only entered a narrow inner loop. The set-point
+then jumps by up to the width of the major loop (1 bar), up to 3 mm of contraction. Only a state of
+all extrema resolves inner loops (:mod:`baselines.positioning.inverse`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
-from typing import Any
+from functools import cache, cached_property, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,60 +39,71 @@ from baselines.core.controller import (
     Prediction,
     Reader,
     RowController,
+    Rows,
     encode_action,
     group_by_load,
     reader,
 )
-from baselines.core.entry import Entry
-from baselines.positioning.branch import DEAD_BAND, Branch, first_branch, next_branch
+from baselines.core.entry import Entry, Spec
 from baselines.positioning.contraction_tables import (
     LOADS,
-    ContractionInverse,
+    BranchCurves,
     one_cubic_inverse,
     pchip_inverse,
     published_inverse,
     table_6_inverse,
 )
 from pam_envs.data.tables import load_contraction_table
-from pam_envs.parameters import Signal, Signals
+from pam_envs.parameters import Signal
 
+DEAD_BAND = 5e-5
+"""Dead band [m] of the branches: 0.05 mm, below the repeatability of the tables."""
 LOWEST, HIGHEST = -0.01, 0.02
 """Range of contractions [m] of the look-up tables; the end values hold beyond."""
 SPACING = 2e-6
 """Spacing [m] of the look-up tables; linear interpolation between is exact to 0.02 Pa."""
 
 
+class Branch(NamedTuple):
+    """Direction, and extremum [m] of the reference since the last change, shapes (n_env,)."""
+
+    inflating: Rows
+    extremum: Array
+
+
+def first_branch(reference: Array, contraction: Array) -> Branch:
+    """Return the branch at an episode's start: from the contraction towards the reference [m]."""
+    return Branch(reference >= contraction, reference)
+
+
+def next_branch(branch: Branch, reference: Array) -> Branch:
+    """Return the branch for the next reference [m]; the argument is unchanged."""
+    back = np.where(branch.inflating, branch.extremum - reference, reference - branch.extremum)
+    turned = back > DEAD_BAND
+    extremum = np.where(turned | (back < 0.0), reference, branch.extremum)
+    return Branch(branch.inflating ^ turned, extremum)
+
+
 @dataclass(frozen=True)
 class TwoBranch(RowController):
-    """Curve of the present branch at the present reference.
+    """Curve of the present branch at the present reference, tabulated for each load.
 
-    The two curves of a load are tabulated when that load first occurs.
-
-    Attributes
-    ----------
-    curves : ContractionInverse
-        Pressure for a contraction, a branch and a load.
-    reader : Reader
-        Of contraction, load and reference; the contraction is read at the start only.
-    action_signal : Signal
-    dead_band : float
-        Of the branch logic [m].
+    The signals read are contraction, at the start only, load and reference.
     """
 
-    curves: ContractionInverse
+    curves: BranchCurves
     reader: Reader
     action_signal: Signal
-    dead_band: float = DEAD_BAND
 
     def initial_state(self, observation: ArrayLike) -> Branch:
-        """See :class:`~baselines.core.controller.RowController`."""
+        """Return the first branch."""
         contraction, _, reference = self.reader.rows(observation)
         return first_branch(reference, contraction)
 
     def respond(self, observation: ArrayLike, state: Branch) -> Prediction:
-        """See :class:`~baselines.core.controller.RowController`."""
+        """Return the action and the next branch."""
         _, load, reference = self.reader.rows(observation)
-        branch = next_branch(state, reference, self.dead_band)
+        branch = next_branch(state, reference)
         pressure = np.empty(len(load))
         for key, rows in group_by_load(load):
             grid, inflation, deflation = self._tabulated(key)
@@ -92,70 +113,48 @@ class TwoBranch(RowController):
         return encode_action(self.action_signal, pressure, observation), branch
 
     @cached_property
-    def _tables(self) -> dict[float, tuple[Array, Array, Array]]:
-        return {}
+    def _tabulated(self) -> Callable[[float], tuple[Array, Array, Array]]:
+        """From a load to contractions [m], and pressures [Pa] of inflation and deflation."""
 
-    def _tabulated(self, load: float) -> tuple[Array, Array, Array]:
-        """Return contractions [m] and the pressures [Pa] of inflation and deflation at a load."""
-        if load not in self._tables:
+        @cache
+        def tabulated(load: float) -> tuple[Array, Array, Array]:
             grid = np.arange(LOWEST, HIGHEST + 0.5 * SPACING, SPACING)
-            up, down = (self.curves.pressure(grid, inflating, load) for inflating in (True, False))
-            self._tables[load] = grid, up, down
-        return self._tables[load]
+            return grid, self.curves(grid, True, load), self.curves(grid, False, load)
+
+        return tabulated
 
 
 @dataclass(frozen=True)
 class Line(RowController):
-    """``set_point = slope * reference``: straight line through the end points of a table.
-
-    Attributes
-    ----------
-    reader : Reader
-        Of load and reference.
-    action_signal : Signal
-    loads : tuple of float
-        Loads [kg] of the tables.
-    slopes : tuple of float
-        Pressure over contraction [Pa/m] at each; that of the nearest load applies.
-    """
+    """``set_point = slope * reference``, with the slope [Pa/m] of the nearest of ``LOADS``."""
 
     reader: Reader
     action_signal: Signal
-    loads: tuple[float, ...]
     slopes: tuple[float, ...]
 
-    def initial_state(self, observation: ArrayLike) -> None:
-        """Return no state."""
-
     def respond(self, observation: ArrayLike, state: Any) -> Prediction:
-        """See :class:`~baselines.core.controller.RowController`."""
+        """Return the action and no state."""
         load, reference = self.reader.rows(observation)
-        nearest = np.abs(load[:, None] - np.array(self.loads)).argmin(axis=1)
+        nearest = np.abs(load[:, None] - np.array(LOADS)).argmin(axis=1)
         value = np.array(self.slopes)[nearest] * reference
         return encode_action(self.action_signal, value, observation), None
 
 
 def make_table_inverse(
-    _plant: Any,
-    signals: Signals,
-    action_signals: Signals,
-    curves: Callable[[], ContractionInverse] = pchip_inverse,
+    spec: Spec[Any], curves: Callable[[], BranchCurves] = pchip_inverse
 ) -> TwoBranch:
     """Return the controller for inverse curves; the default interpolates the readings."""
-    names = ["contraction", "load", "reference"]
-    return TwoBranch(curves(), reader(signals, names), action_signals["pressure_set_point"])
+    signals = reader(spec.signals, ["contraction", "load", "reference"])
+    return TwoBranch(curves(), signals, spec.actions["pressure_set_point"])
 
 
-def make_linear(_plant: Any, signals: Signals, action_signals: Signals) -> Line:
+def make_linear(spec: Spec[Any]) -> Line:
     """Return the straight line from (0, 0) to the mean contraction at the highest pressure."""
     table = load_contraction_table()
     ends = [(p[-1], x[-1].mean()) for p, x in (table.branch(load, True) for load in LOADS)]
-    return Line(
-        reader(signals, ["load", "reference"]),
-        action_signals["pressure_set_point"],
-        LOADS,
-        tuple(float(p / x) for p, x in ends),
-    )
+    signals = reader(spec.signals, ["load", "reference"])
+    slopes = tuple(float(p / x) for p, x in ends)
+    return Line(signals, spec.actions["pressure_set_point"], slopes)
 
 
 TABLES = partial(Entry, knowledge="tables", citation="positioning2021")

@@ -18,15 +18,12 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from baselines.linear.systems import DiscreteSystem, state_space
+from baselines.linear.systems import StateSpace, state_space
 from baselines.robust.requirements import RobustDesign
-
-if TYPE_CHECKING:
-    from control import StateSpace
 
 Kind = Literal["hinf", "mu"]
 Stage = Literal["full", "reduced"]
@@ -44,22 +41,10 @@ def robust_controller(
 ) -> StateSpace:
     """Return a controller in continuous time, from error [rad] to command [rad].
 
-    Parameters
-    ----------
-    kind : {"hinf", "mu"}
-    stage : {"full", "reduced"}
-        As synthesised, or as the controllers use it.
-    pole : float, optional
-        Of the joint [rad/s]; that of the design if not given.
+    ``stage``: as synthesised, or reduced as the controllers use it; ``pole`` of the joint [rad/s],
+    by default that of the design.
     """
     numbers = frozen()[kind][stage]
     a, b, c = (np.array(numbers[name]) for name in "abc")
     pace = 1.0 if pole is None else pole / RobustDesign().pole
     return state_space(pace * a, pace * b, c, numbers["d"])
-
-
-def frozen_loop(kind: Kind) -> DiscreteSystem:
-    """Return a controller at the control period of its design."""
-    numbers = frozen()[kind]["discrete"]
-    a, b, c = (np.array(numbers[name]) for name in "abc")
-    return DiscreteSystem(a, b, c, np.asarray(numbers["d"]), float(frozen()["period"]))

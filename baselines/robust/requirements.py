@@ -25,16 +25,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baselines.core.controller import Array
-from baselines.linear.systems import Complex, double_lag, from_polynomials, response
-
-if TYPE_CHECKING:
-    from control import StateSpace
+from baselines.linear.systems import Complex, StateSpace, double_lag, from_polynomials, response
 
 FREQUENCIES = np.geomspace(1e-2, 1e3, 401)
 """Frequencies [rad/s] at which loops are evaluated."""
@@ -92,23 +88,16 @@ class RobustDesign:
         low = [1.0 / self.neglected_high, self.neglected_corner]
         return from_polynomials([1.0, self.neglected_corner * self.neglected_low], low)
 
-    def structured_value(self, loop: Complex, frequency: Array = FREQUENCIES) -> Array:
-        """Return ``mu`` at each frequency [rad/s], with the gain real; loop of shape (n,)."""
-        margin = np.abs(response(self.performance, frequency))
-        margin = margin + np.abs(response(self.neglected, frequency) * loop)
+    def structured_value(self, loop: Complex) -> Array:
+        """Return ``mu`` at each of ``FREQUENCIES``, with the gain real; loop of shape (n,)."""
+        margin = np.abs(response(self.performance, FREQUENCIES))
+        margin = margin + np.abs(response(self.neglected, FREQUENCIES) * loop)
         low, high = np.zeros(len(loop)), np.full(len(loop), 1.0 / 1e-6)
         for _ in range(DOUBLINGS):
             size = np.sqrt(np.maximum(low, 1e-12) * high)
             broken = self._nearest(loop, size) <= size * margin
             low, high = np.where(broken, low, size), np.where(broken, size, high)
         return np.asarray(1.0 / high)
-
-    def complex_value(self, loop: Complex, frequency: Array = FREQUENCIES) -> Array:
-        """Return ``mu`` with the gain's uncertainty taken as complex: never below the real one."""
-        tracking = np.abs(loop / (1.0 + loop))
-        spread = self.gain_spread + np.abs(response(self.neglected, frequency))
-        asked = np.abs(response(self.performance, frequency) / (1.0 + loop))
-        return np.asarray(spread * tracking + asked)
 
     def _nearest(self, loop: Complex, size: Array) -> Array:
         """Return the smallest ``|1 + L (1 + g delta)|`` for ``|delta| <= size``."""

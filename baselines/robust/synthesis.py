@@ -11,8 +11,7 @@ extra. The steps:
    rank-one matrix at hand ``d_i^2 = 1 / |a_i|``), fitted by a stable system with a stable
    inverse, and the synthesis is repeated; the controller of the round with the smallest ``mu``.
 3. Modes beyond ``FAST`` are replaced by their static gain, the slowest, which approximates an
-   integrator, becomes one, and the rest is reduced by balanced residualisation to ``ORDER`` states;
-   the whole is made discrete by the bilinear rule at 10 ms.
+   integrator, becomes one, and the rest is reduced by balanced residualisation to ``ORDER`` states.
 
 The real gain is scaled as if it were complex (D and not D, G); ``mu`` of the result is that with a
 real gain, exact, and its bound by SLICOT's AB13MD beside it.
@@ -23,7 +22,7 @@ from __future__ import annotations
 import json
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -31,16 +30,11 @@ from scipy.optimize import least_squares
 from baselines.core.controller import Array
 from baselines.linear.ltr import integrator
 from baselines.linear.reduction import residualised, split, without_fast
-from baselines.linear.systems import Complex, DiscreteSystem, discrete, from_polynomials, response
+from baselines.linear.systems import Complex, StateSpace, from_polynomials, response
 from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
 
-if TYPE_CHECKING:
-    from control import StateSpace
-
-    Scales = tuple[StateSpace, StateSpace] | None
-
+Scales = tuple[StateSpace, StateSpace] | None
 FILE = Path(__file__).with_name("joint_robust.json")
-PERIOD = 0.01
 FAST, INTEGRATOR = 1e3, 0.1
 """Frequencies [rad/s] beyond which modes count as settled, and within which one integrates."""
 ROUNDS = 6
@@ -146,7 +140,6 @@ def frozen(design: RobustDesign, controller: StateSpace) -> dict[str, Any]:
     return {
         "full": _numbers(controller),
         "reduced": _numbers(reduced),
-        "discrete": _discrete_numbers(discrete(reduced, PERIOD)),
         "hankel": sizes.tolist(),
         "mu_full": float(design.structured_value(full_loop).max()),
         "mu_reduced": float(design.structured_value(loop).max()),
@@ -176,10 +169,6 @@ def _numbers(system: StateSpace) -> dict[str, Any]:
     return {"a": a, "b": b, "c": c, "d": float(system.D[0, 0])}
 
 
-def _discrete_numbers(system: DiscreteSystem) -> dict[str, Any]:
-    return {name: getattr(system, name).tolist() for name in "abcd"}
-
-
 def main() -> None:
     """Synthesise, write the numbers, and print the figures."""
     design = RobustDesign()
@@ -188,14 +177,13 @@ def main() -> None:
     made = {
         "made_by": "python -m baselines.robust.synthesis",
         "versions": {name: version(name) for name in ("control", "slycot", "numpy", "scipy")},
-        "period": PERIOD,
         "mu_by_round": rounds,
         **loops,
     }
     FILE.write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
     for kind, numbers in loops.items():
-        hidden = ("full", "reduced", "discrete")
-        print(kind, json.dumps({k: v for k, v in numbers.items() if k not in hidden}))
+        figures = {k: v for k, v in numbers.items() if k not in ("full", "reduced")}
+        print(kind, json.dumps(figures))
     print("mu by round", rounds)
 
 

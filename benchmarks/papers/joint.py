@@ -158,7 +158,7 @@ def law_response(made: Any, frequency: Array) -> Complex:
     - s T / 2)``.
     """
     loop = made.disturbance if hasattr(made, "disturbance") else made.loop
-    bank, half = loop.controller, 0.5j * frequency * made.model.period
+    bank, half = loop.controller, 0.5j * frequency * loop.controller.period
     eye = np.eye(bank.a.shape[1])
     z = (1.0 + half) / (1.0 - half)
     found = np.linalg.solve(z[:, None, None] * eye - bank.a[0], bank.b[0][:, None])

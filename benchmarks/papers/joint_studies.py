@@ -27,6 +27,7 @@ from scipy.interpolate import CubicSpline
 
 import pam_envs  # noqa: F401  registers the ids
 from baselines.core.catalogue import CONTROLLERS, make_controller
+from baselines.core.entry import Spec
 from baselines.joint.model import POLE
 from baselines.linear.systems import discrete, double_lag
 from benchmarks.runs import rollout
@@ -153,7 +154,7 @@ def run(
 
 def controller(name: str, rig: ReducedRig) -> Any:
     """Return a controller of the catalogue for the reduced plant."""
-    return CONTROLLERS[name].make(rig, SIGNALS, ACTIONS)
+    return CONTROLLERS[name].make(Spec(rig, SIGNALS, ACTIONS))
 
 
 @dataclass(frozen=True)

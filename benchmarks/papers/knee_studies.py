@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pam_envs  # noqa: F401  registers the ids
-from baselines.knee.inverse import make_knee_forward
+from baselines.core.entry import Spec
+from baselines.knee.feedforward import make_knee_forward
 from baselines.knee.ltr import make_knee_ltr
 from benchmarks.runs import rollout
 from benchmarks.scoring.group import rms
@@ -100,7 +101,7 @@ def _error(quantity: str, plant: KneeOrthosis, make: Any, **knobs: Any) -> float
     how: dict[str, Any] = {"start": "paper", "reference": "sine", "frequency": FREQUENCY}
     how |= {"plant": plant, "episode_seconds": DROPPED + CYCLES / FREQUENCY}
     env: Any = gym.make(f"PAM/Knee{quantity}-v0", disable_env_checker=True, **how).unwrapped
-    controller = make(plant, env.signals, env.action_signals, **knobs)
+    controller = make(Spec(plant, env.signals, env.action_signals), **knobs)
     signals = rollout.run(env, controller, 0).signals
     kept = signals["time"] > DROPPED + 1e-6
     reference = signals["reference"][kept]
@@ -133,7 +134,7 @@ def stride(
         episode_seconds=round(3.2 * pace, 2),
     ).unwrapped
     signals = (env.signals, env.action_signals)
-    controller = make_knee_ltr(plant, *signals, bumpless=bumpless, preview=preview)
+    controller = make_knee_ltr(Spec(plant, *signals), bumpless=bumpless, preview=preview)
     episode = rollout.run(env, controller, 0)
     command = signals[1]["pressure_set_point"].decode(episode.actions)
     return {**episode.signals, "set_point": command}

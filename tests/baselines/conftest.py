@@ -12,6 +12,7 @@ import pytest
 import pam_envs  # noqa: F401  registers the ids
 from baselines.core.catalogue import make_controller
 from baselines.core.controller import Controller
+from baselines.core.entry import Spec
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 HOLD = 90
@@ -35,25 +36,34 @@ def quiet(hysteresis: str, **changes: float) -> SingleMuscle:
     )
 
 
-def make_env(**arguments: Any) -> Any:
-    return gym.make(ID, disable_env_checker=True, **arguments).unwrapped
+def make_env(env: str = ID, **arguments: Any) -> Any:
+    return gym.make(env, disable_env_checker=True, **arguments).unwrapped
 
 
-def built(name: str, env: Any, plant: Any = None) -> Controller:
+def spec_of(env: Any) -> Spec[Any]:
+    return Spec(env.plant, env.signals, env.action_signals)
+
+
+def built(name: str, env: Any, plant: Any = None, seed: int = 0, **knobs: float) -> Any:
     model = env.plant if plant is None else plant
-    return make_controller(name, model, env.signals, env.action_signals)
+    return make_controller(name, model, env.signals, env.action_signals, seed, knobs)
 
 
-def rollout(env: Any, controller: Controller, seed: int = 1) -> dict[str, np.ndarray]:
-    """Return the recorded info of one episode."""
-    observation, _ = env.reset(seed=seed)
-    state, start, over, rows = None, True, False, []
+def rollout(env: Any, controller: Controller) -> dict[str, np.ndarray]:
+    """Return the recorded info of one whole episode, and the first action's command [SI]."""
+    observation, _ = env.reset(seed=1)
+    state, over, rows = None, False, []
     while not over:
-        action, state = controller.predict(observation, state, start)
-        observation, _, terminated, truncated, info = env.step(action)
-        start, over = False, terminated or truncated
-        rows.append(info)
+        action, state = controller.predict(observation, state, state is None)
+        observation, _, terminated, over, info = env.step(action)
+        assert not terminated
+        signal = next(iter(env.action_signals))
+        rows.append({**info, "command": signal.decode(action)})
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+def rms(error: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(error**2)))
 
 
 def observations_of(env: Any, steps: int = 40, rows: int = 4) -> np.ndarray:

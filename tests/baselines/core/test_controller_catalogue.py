@@ -43,10 +43,9 @@ class Integrator:
         return encode_action(self.action_signal, command, observation), (command,)
 
 
-def make(plant, signals, action_signals, knobs=()):
-    names = ["contraction", "set_point", "reference"]
-    gain = dict(knobs).get("gain", 1.0) * 2e6
-    return Integrator(reader(signals, names), action_signals["pressure_set_point"], gain)
+def make(spec):
+    signals = reader(spec.signals, ["contraction", "set_point", "reference"])
+    return Integrator(signals, spec.actions["pressure_set_point"], 2e6 * spec.knob("gain"))
 
 
 ENTRIES = {

@@ -12,26 +12,26 @@ import numpy as np
 import pytest
 import yaml
 
-import pam_envs  # noqa: F401  registers the ids
 from baselines.core import tuned
-from baselines.core.catalogue import CONTROLLERS, PUBLISHED, make_controller
+from baselines.core.catalogue import CONTROLLERS, PUBLISHED
 from baselines.joint import model as joint_model
-from baselines.joint.tracking import make_model_loop
+from baselines.joint.loop import make_model_loop
 from baselines.knee import design as knee_design
-from baselines.linear.simc import simc_rule
+from baselines.linear.pid import simc_rule
 from benchmarks.papers.joint_studies import ReducedRig
 from pam_envs.identification.frequency import fit_rational
+from tests.baselines.conftest import built, make_env
 from tests.object_digest import object_digest
 
 FREQUENCIES = np.geomspace(0.5, 60.0, 24)
 RIG = fit_rational(FREQUENCIES, 1.2 / (1.0 + 0.05j * FREQUENCIES), 1)
 """A knee's tension over its pressure set-point, so that nothing has to be identified."""
-ENVS = {
-    "PAM/MusclePositioning-v0": {},
-    "PAM/KneeStiffness-v0": {},
-    "PAM/AntagonisticJoint-v0": {},
-    "PAM/ElbowOrthosis-v0": {},
-}
+ENVS = (
+    "PAM/MusclePositioning-v0",
+    "PAM/KneeStiffness-v0",
+    "PAM/AntagonisticJoint-v0",
+    "PAM/ElbowOrthosis-v0",
+)
 PAIRS = [
     (name, next(env for env in ENVS if env in entry.envs))
     for name, entry in PUBLISHED.items()
@@ -44,22 +44,13 @@ def known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Replace what is identified on plants by models that are at hand."""
     monkeypatch.setattr(knee_design, "identify", lambda plant, output: RIG)
     monkeypatch.setattr(knee_design, "_DESIGNS", {})
-    joint = made_env("PAM/AntagonisticJoint-v0").plant
-    key = f"{joint.digest()} {joint_model.LEVELS}"
-    monkeypatch.setitem(joint_model._HYSTERESIS_MODELS, key, ReducedRig().hysteresis)
-
-
-def made_env(env: str) -> Any:
-    return gym.make(env, disable_env_checker=True, **ENVS[env]).unwrapped
-
-
-def built(name: str, env: Any, **knobs: float) -> Any:
-    return make_controller(name, env.plant, env.signals, env.action_signals, knobs=knobs)
+    joint = make_env("PAM/AntagonisticJoint-v0").plant
+    monkeypatch.setitem(joint_model._HYSTERESIS_MODELS, joint.digest(), ReducedRig().hysteresis)
 
 
 @pytest.mark.parametrize(("name", "env"), PAIRS)
 def test_knobs_at_1_change_nothing_and_each_alone_changes_the_controller(name, env):
-    base, bounds = made_env(env), PUBLISHED[name].knobs
+    base, bounds = make_env(env), PUBLISHED[name].knobs
     plain = object_digest(built(name, base))
     assert object_digest(built(name, base, **dict.fromkeys(bounds, 1.0))) == plain
     for knob, (low, high) in bounds.items():
@@ -75,21 +66,22 @@ def test_every_environment_has_a_pid_and_a_papers_controller_to_tune():
         assert any(PUBLISHED[n].citation and "pid" not in n for n in named)
 
 
-def test_times_of_the_rule():
+def test_knobs_scale_the_times_of_the_simc_rule():
     plain = simc_rule(2.0, 0.3, 0.05, 0.02)
-    slow = simc_rule(2.0, 0.3, 0.05, 0.02, knobs={"closed_loop_time": 3.0})
+    slow, late, keen = (
+        simc_rule(2.0, 0.3, 0.05, 0.02, knobs={f"{name}_time": factor})
+        for name, factor in (("closed_loop", 3.0), ("integral", 2.0), ("derivative", 2.0))
+    )
     assert slow.gain == pytest.approx(0.5 * plain.gain)
     assert slow.integral_time == 0.3
-    late = simc_rule(2.0, 0.3, 0.05, 0.02, knobs={"integral_time": 2.0})
     assert late == plain._replace(integral_time=2.0 * plain.integral_time)
-    keen = simc_rule(2.0, 0.3, 0.05, 0.02, knobs={"derivative_time": 2.0})
     assert keen == plain._replace(derivative_time=0.1)
 
 
 def test_knobs_of_the_muscle_act_on_their_numbers():
-    env = made_env("PAM/MusclePositioning-v0")
+    env = make_env("PAM/MusclePositioning-v0")
     pid, inverse = built("pid", env), built("inverse", env)
-    assert built("pid", env, reach=2.0).reach == pytest.approx(2.0 * pid.reach)
+    assert built("pid", env, reach=2.0).view.reach == pytest.approx(2.0 * pid.view.reach)
     assert built("pid", env, closed_loop_time=2.0).gains.integral < pid.gains.integral
     assert built("inverse", env, horizon=2.0).horizon == 2.0 * inverse.horizon
     times = np.arange(inverse.aims.shape[1])
@@ -103,13 +95,13 @@ def test_knobs_of_the_muscle_act_on_their_numbers():
 
 
 def test_knobs_of_the_knee_act_on_their_numbers():
-    env = made_env("PAM/KneeStiffness-v0")
+    env = make_env("PAM/KneeStiffness-v0")
     plain = knee_design.design(env.plant, "tension").figures
     fast = knee_design.design(env.plant, "tension", knobs={"bandwidth": 2.0}).figures
     tame = knee_design.design(env.plant, "tension", knobs={"recovery": 10.0}).figures
     assert fast.bandwidth > 1.5 * plain.bandwidth
     assert tame.bandwidth < plain.bandwidth
-    aheads = [built("knee_inverse_ahead", env, lead=k).preview.weights for k in (1.0, 2.0)]
+    aheads = [built("knee_inverse_ahead", env, lead=k).forward.preview.weights for k in (1.0, 2.0)]
     times = np.arange(len(aheads[0]))
     assert aheads[1] @ times == pytest.approx(2.0 * (aheads[0] @ times))
     loops = [built("knee_inverse_ltr", env, bandwidth=k).tension for k in (1.0, 2.0)]
@@ -117,24 +109,24 @@ def test_knobs_of_the_knee_act_on_their_numbers():
 
 
 def test_knobs_of_the_joint_act_on_their_numbers():
-    env = made_env("PAM/AntagonisticJoint-v0")
-    leads = [built("joint_pid_ahead", env, lead=k).lookahead.weights[0] for k in (0.5, 1.0)]
+    env = make_env("PAM/AntagonisticJoint-v0")
+    leads = [built("joint_pid_ahead", env, lead=k).parts.preview[0] for k in (0.5, 1.0)]
     times = np.arange(len(leads[0]))
     assert leads[0] @ times < leads[1] @ times
     plain = built("joint_mfc_mu_ahead", env)
     fast = built("joint_mfc_mu_ahead", env, disturbance=2.0)
-    np.testing.assert_array_equal(fast.lookahead.weights, plain.lookahead.weights)
+    np.testing.assert_array_equal(fast.parts.preview, plain.parts.preview)
     gains = [np.abs(made.disturbance.controller.b).max() for made in (plain, fast)]
     assert gains[1] > gains[0]
     slow = built("joint_mfc_mu_ahead", env, damping=1.4)
-    assert slow.lookahead.weights[0] @ times > plain.lookahead.weights[0] @ times
-    loops = [make_model_loop(plain.model, damping) for damping in (0.5, 1.0)]
+    assert slow.parts.preview[0] @ times > plain.parts.preview[0] @ times
+    loops = [make_model_loop(plain.parts.model, damping) for damping in (0.5, 1.0)]
     shares = [float(loop.d[0]) for loop in loops]  # of the reference, at once
     assert shares[0] > shares[1]
 
 
-def test_elbow():
-    env = made_env("PAM/ElbowOrthosis-v0")
+def test_knobs_of_the_elbow_act_on_their_numbers():
+    env = make_env("PAM/ElbowOrthosis-v0")
     plain = built("elbow_pid", env)
     assert built("elbow_pid", env, start=2.0).middle == 2.0 * plain.middle
     assert built("elbow_pid", env, integral_time=2.0).gains.integral < plain.gains.integral
@@ -142,14 +134,13 @@ def test_elbow():
     outer = built("elbow_allocation_early", env, pressure_loop=1.5, step=0.5).loop
     view = built("elbow_pid", env).signals.read(env.reset(seed=1)[0])
     view = view._replace(pressure=np.full_like(view.pressure, 2e5))
-    wanted = view.pressure + 1e4
+    near, far = view.pressure + 1e4, np.full_like(view.pressure, outer.full)
     np.testing.assert_allclose(
-        outer.commands(view, wanted) - 2e5, 1.5 * (inner.commands(view, wanted) - 2e5)
+        outer.commands(view, near) - 2e5, 1.5 * (inner.commands(view, near) - 2e5)
     )
     for narrow, wide in zip(outer.reach(view), inner.reach(view), strict=True):
         np.testing.assert_allclose(narrow - 2e5, 0.5 * (wide - 2e5))
-    far = outer.commands(view, np.full_like(wanted, outer.full))
-    assert np.all(far == inner.commands(view, np.full_like(wanted, outer.full)))
+    assert np.all(outer.commands(view, far) == inner.commands(view, far))
 
 
 @pytest.mark.parametrize(
@@ -161,13 +152,11 @@ def test_elbow():
         ("table", {"reach": 1.0}, r"table has no knob 'reach'; it has none"),
     ],
 )
-def test_what_a_controller_does_not_have_is_refused(name, knobs, message):
-    env = made_env("PAM/MusclePositioning-v0")
+def test_knob_or_value_outside_the_entry_is_refused(name, knobs, message):
+    env = make_env("PAM/MusclePositioning-v0")
     with pytest.raises(ValueError, match=message):
         built(name, env, **knobs)
 
-
-# --- the file ---------------------------------------------------------------------------------
 
 FOUND = tuned.Tuned(
     controller="pid",
@@ -196,7 +185,7 @@ def test_entries_of_the_file_are_in_the_catalogue_with_their_budget():
         assert found.after <= found.before
 
 
-def test_an_entry_is_the_published_controller_with_its_knobs(monkeypatch, tmp_path):
+def test_tuned_entry_is_the_published_controller_with_its_knobs(monkeypatch, tmp_path):
     file = written(tmp_path, {"pid_tuned": dataclasses.asdict(FOUND)})
     read = tuned.read(file)
     assert read == {"pid_tuned": FOUND}
@@ -204,11 +193,11 @@ def test_an_entry_is_the_published_controller_with_its_knobs(monkeypatch, tmp_pa
     assert entry.citation == PUBLISHED["pid"].citation and entry.trials == 20
     assert not entry.knobs and "closed_loop_time, reach" in entry.summary
     monkeypatch.setitem(CONTROLLERS, "pid_tuned", entry)
-    env = made_env("PAM/MusclePositioning-v0")
+    env = make_env("PAM/MusclePositioning-v0")
     assert object_digest(built("pid_tuned", env)) == object_digest(built("pid", env, **FOUND.knobs))
 
 
-def test_names_tell_environments_apart():
+def test_tuned_names_differ_by_environment():
     assert tuned.tuned_name("pid", "PAM/MusclePositioning-v0") == "pid_tuned"
     assert tuned.tuned_name("knee_pid", "PAM/KneeWalk-v0") == "knee_pid_tuned_walk"
     pairs = [(n, env) for n, entry in PUBLISHED.items() for env in entry.envs if entry.knobs]

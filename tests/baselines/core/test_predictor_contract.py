@@ -5,12 +5,10 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
-import pam_envs  # noqa: F401  registers the ids
-from baselines.core.catalogue import PUBLISHED, make_controller
+from baselines.core.catalogue import PUBLISHED
 from baselines.core.checks import check_controller
 from baselines.core.environments import ELBOW, KNEE, POSITIONING
 from tests.baselines.conftest import ID, built, make_env, observations_of
@@ -34,13 +32,9 @@ CASES = [
 ]
 
 
-def environment(env: str, **arguments: Any) -> Any:
-    return gym.make(env, disable_env_checker=True, **arguments).unwrapped
-
-
 @cache
 def observed(env: str, variant: tuple[tuple[str, Any], ...], steps: int = 16) -> Any:
-    made = environment(env, **dict(variant))
+    made = make_env(env, **dict(variant))
     return made, observations_of(made, steps=steps, rows=3)
 
 
@@ -89,13 +83,12 @@ def test_entry_is_complete_and_correct_about_the_preview(name, env):
 
 @pytest.mark.parametrize("name", ["random", "elbow_random", "joint_random"])
 def test_random_is_a_function_of_seed_row_and_draw(name):
-    env = environment(PUBLISHED[name].envs[0])
+    env = make_env(PUBLISHED[name].envs[0])
     batch = np.array([env.reset(seed=s)[0] for s in range(200)])
     a, state = built(name, env).predict(batch)
     b, _ = built(name, env).predict(batch)
-    other = make_controller(name, env.plant, env.signals, env.action_signals, seed=1)
     np.testing.assert_array_equal(a, b)
-    assert np.all(other.predict(batch)[0] != a)
+    assert np.all(built(name, env, seed=1).predict(batch)[0] != a)
     assert len(np.unique(a)) == a.size
     later, _ = built(name, env).predict(batch, state)
     assert np.all(later != a)

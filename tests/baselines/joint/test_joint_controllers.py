@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 from baselines.core.catalogue import PUBLISHED, make_controller
+from baselines.core.entry import Spec
 from baselines.core.environments import JOINT
-from baselines.joint.gravity import Gravity
+from baselines.joint.base import Gravity
+from baselines.joint.model import joint_model
 from baselines.joint.poles import FREQUENCIES, phase
 from baselines.joint.view import make_joint_signal_map
 from benchmarks.papers.joint_studies import (
@@ -19,7 +23,6 @@ from benchmarks.papers.joint_studies import (
     controller,
     run,
 )
-from pam_envs.envs.joint import env as antagonistic_joint
 from pam_envs.envs.manipulator import env as redundant_manipulator
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -39,7 +42,7 @@ def _two(name):
     names = ["angle_0", "angle_1", "set_point_0", "set_point_1"]
     names += ["joint_reference_0", "joint_reference_1"]
     actions = _signals(["angle_set_point_0", "angle_set_point_1"], True)
-    made = PUBLISHED[name].make(RIG, _signals(names), actions)
+    made = PUBLISHED[name].make(Spec(RIG, _signals(names), actions))
     return made, actions
 
 
@@ -60,30 +63,20 @@ def test_two_joints_are_two_single_ones(name):
             assert actions[k].decode(both) == pytest.approx(float(action[0]), abs=1e-6)
 
 
-SETUPS = {
-    JOINT[0]: (AntagonisticJoint.paper, antagonistic_joint.make_setup),
-    JOINT[1]: (RedundantManipulator.paper, redundant_manipulator.make_setup),
-}
-
-
-def test_arm_without_a_plan_is_refused_and_the_remedy_named():
-    setup = redundant_manipulator.make_setup(plan=False)
+def test_arm_without_a_plan_is_refused_except_by_inverse_kinematics():
+    setup, plant = redundant_manipulator.make_setup(plan=False), RedundantManipulator.paper()
+    signals = setup.signals, setup.action_signals
     with pytest.raises(ValueError, match="make the environment with plan=True"):
-        make_joint_signal_map(setup.signals, setup.action_signals)
-
-
-def test_inverse_kinematics_needs_no_plan():
-    setup = redundant_manipulator.make_setup(plan=False)
-    told = (setup.signals, setup.action_signals)
-    made = make_controller("joint_inverse_kinematics", RedundantManipulator.paper(), *told)
-    assert made.limit == RedundantManipulator.paper().angle_range[1]
+        make_joint_signal_map(*signals)
+    made = make_controller("joint_inverse_kinematics", plant, *signals)
+    assert made.limit == plant.angle_range[1]
     nowhere = np.zeros(len(setup.signals), np.float32)  # a pose without a direction
     action, state = made.predict(nowhere)
     np.testing.assert_array_equal(action, np.zeros(6))
     assert state.missed[0] == 1
 
 
-def test_other_actions_are_refused():
+def test_actions_other_than_angles_are_refused():
     actions = Signals([Signal("pressure_a_set_point", "Pa", 0.0, 6e5, 0)])
     with pytest.raises(ValueError, match="action='angle'"):
         make_joint_signal_map(SIGNALS, actions)
@@ -126,7 +119,7 @@ def test_joint_with_the_models_hysteresis_is_the_model():
     np.testing.assert_allclose(found.angle[9::10], found.model, atol=1e-6)
 
 
-def test_feedback_removes_a_standing_error():
+def test_feedback_removes_a_constant_error():
     for name in ("joint_pi", "joint_pi_slow", "joint_pid", "joint_mfc_mu", "joint_mfc_mu_wrong"):
         found = run(
             controller(name, RIG), np.full(400, 7.0 * DEGREE), RIG, lambda t: 0.02 + 0.0 * t
@@ -148,3 +141,18 @@ def test_phase_of_a_double_lag_is_a_quarter_turn_at_its_pole():
     angle = 1.0 - np.exp(-6.0 * time) * (1.0 + 6.0 * time)
     found = phase(np.diff(np.append(0.0, angle)), 0.01)
     assert np.interp(6.0, FREQUENCIES, found) == pytest.approx(-0.5 * np.pi, abs=0.01)
+
+
+def test_asymmetric_hysteresis_warns_with_value_and_bound():
+    joint = AntagonisticJoint.paper(muscle__imbalance=0.08)
+    with pytest.warns(UserWarning, match=r"fails the symmetry: symmetry 0\.0\d\d \(bound 0.03\)"):
+        model = joint_model(joint)
+    assert model.hysteresis is not None and model.hysteresis.start == "low"
+
+
+@pytest.mark.parametrize("preset", ["paper", "measured", "reduced"])
+def test_presets_raise_no_warning(preset):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model = joint_model(getattr(AntagonisticJoint, preset)())
+    assert model.hysteresis is not None and model.hysteresis.start == "virgin"

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from baselines.core.controller import preview_weights
+from baselines.core.entry import Spec
+from baselines.joint.base import MAX_EXTRAPOLATION, double_pole_delays
 from baselines.joint.feedback import (
     make_joint_feedback,
     pid_delay,
@@ -15,7 +18,6 @@ from baselines.joint.feedback import (
 from baselines.joint.loop import pi_system, pole_cancelling
 from baselines.joint.model import POLE
 from baselines.joint.model_following import make_model_following
-from baselines.joint.preview import MAX_EXTRAPOLATION, ahead_by, double_pole_delays, present
 from baselines.linear.systems import discrete, double_lag
 from benchmarks.papers.joint_studies import ACTIONS, RANGE, ReducedRig
 from pam_envs.parameters import Signal, Signals
@@ -26,30 +28,33 @@ SIGNALS = Signals(
     Signal(name, "rad", -RANGE, RANGE, k, False, max(0.0, 0.04 * (k - 2)))
     for k, name in enumerate(NAMES)
 )
-RIG = ReducedRig(0.0)
+SPEC = Spec(ReducedRig(0.0), SIGNALS, ACTIONS)
 
 
-def test_straight_line_is_read_exactly_within_and_beyond_the_previews():
-    leads = (0.0, 0.01, 0.05, 0.12, 0.2)
-    samples = np.tile(0.3 - 2.0 * np.array(TIMES), (1, len(leads), 1))
-    found = ahead_by(leads, TIMES).reference(samples)
-    np.testing.assert_allclose(found, [0.3 - 2.0 * np.array(leads)], atol=1e-12)
+def _read(lead, samples, times=TIMES):
+    return preview_weights(times, lead, MAX_EXTRAPOLATION) @ samples
 
 
-def test_only_the_samples_around_are_read_within_the_previews():
-    weights = ahead_by((0.05,), TIMES).weights[0]
-    np.testing.assert_allclose(weights, [0.0, 0.75, 0.25, 0.0])
+@pytest.mark.parametrize("lead", [0.0, 0.01, 0.05, 0.12, 0.2])
+def test_straight_line_is_read_exactly_within_and_beyond_the_previews(lead):
+    assert _read(lead, 0.3 - 2.0 * np.array(TIMES)) == pytest.approx(0.3 - 2.0 * lead, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("times", "lead", "weights"),
+    [
+        (TIMES, 0.05, [0.0, 0.75, 0.25, 0.0]),
+        (TIMES, 0.0, [1.0, 0.0, 0.0, 0.0]),
+        ((0.0,), 0.3, [1.0]),
+        ((0.0, 0.04, 0.08), 0.5, [0.0, 0.0, 1.0]),
+    ],
+)
+def test_weights_interpolate_the_neighbouring_samples(times, lead, weights):
+    np.testing.assert_allclose(preview_weights(times, lead), weights, atol=1e-12)
 
 
 def test_extrapolation_is_bounded():
-    samples = np.array([[[0.0, 0.0, 0.0, 1.0]]])
-    assert ahead_by((99.0,), TIMES).reference(samples)[0, 0] == 1.0 + MAX_EXTRAPOLATION
-
-
-def test_without_previews_the_present_is_read():
-    np.testing.assert_array_equal(ahead_by((0.3,), (0.0,)).weights, present(1).weights)
-    samples = np.array([[[0.2, 0.5, 0.1]]])
-    assert present(3).reference(samples)[0, 0] == 0.2
+    assert _read(99.0, [0.0, 0.0, 0.0, 1.0]) == 1.0 + MAX_EXTRAPOLATION
 
 
 @pytest.mark.parametrize("pole", [5.5, POLE])
@@ -94,10 +99,10 @@ def _error(made) -> float:
 
 
 def test_sine_is_followed_without_the_delay():
-    late = _error(make_model_following(RIG, SIGNALS, ACTIONS))
+    late = _error(make_model_following(SPEC))
     assert late == pytest.approx(np.sqrt(0.5) * np.pi * (2.0 / POLE + 0.5 * PERIOD), rel=0.02)
-    assert _error(make_model_following(RIG, SIGNALS, ACTIONS, ahead=True)) < 0.02 * late
+    assert _error(make_model_following(SPEC, ahead=True)) < 0.02 * late
     for kind in ("pi", "pid", "pid_smooth"):
-        made = make_joint_feedback(RIG, SIGNALS, ACTIONS, kind=kind, ahead=True)
-        alone = make_joint_feedback(RIG, SIGNALS, ACTIONS, kind=kind)
+        made = make_joint_feedback(SPEC, kind=kind, ahead=True)
+        alone = make_joint_feedback(SPEC, kind=kind)
         assert _error(made) < 0.1 * _error(alone)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +13,7 @@ from baselines.linear.bumpless import (
     SMALLEST,
     Bumpless,
     BumplessGains,
+    BumplessState,
     certificate,
     design_bumpless,
 )
@@ -25,25 +29,30 @@ def compensated(low: float = -200.0, high: float = 250.0, gains: BumplessGains =
     return make(PLANT, printed_controller(), PERIOD, low, high, gains)
 
 
-def switched(loop: Bumpless, offset: float, seconds: float = 2.0) -> tuple[float, float]:
-    """Swing with a reference that is off by ``offset`` [N], then stance on the true one.
+def simulated(
+    loop: Bumpless, reference: Callable[[int], float], steps: int, charged_from: int = 0
+) -> tuple[np.ndarray, np.ndarray, BumplessState]:
+    """Return commands, outputs and last state of a loop on the plant; before charge, commands 0."""
+    rig = discrete(PLANT, PERIOD, "zoh")
+    inside, state, commands, outputs = rig.initial_state(), loop.initial_state(), [], []
+    for k in range(steps):
+        measured = float(inside @ rig.c)
+        own = float(loop.output(reference(k), measured, state))
+        command = own if k >= charged_from else 0.0
+        state = loop.advance(reference(k), measured, command, state)
+        inside = rig.advance(command, inside)
+        commands.append(command)
+        outputs.append(measured)
+    return np.array(commands), np.array(outputs), state
+
+
+def switched(loop: Bumpless, offset: float) -> tuple[float, float]:
+    """Swing with a reference that is off by ``offset`` [N], then stance on the true one, from 2 s.
 
     Returns the largest tension error [N] and jump of the pressure [kPa] after the switch.
     """
-    rig = discrete(PLANT, PERIOD, "zoh")
-    inside, state, last = rig.initial_state(), loop.initial_state(), 0.0
-    errors, jumps = [], []
-    for k in range(600):
-        stance = k * PERIOD >= seconds
-        measured, reference = float(inside @ rig.c), 0.0 if stance else offset
-        command = float(loop.output(reference, measured, state)) if stance else 0.0
-        state = loop.advance(reference, measured, command, state)
-        inside = rig.advance(command, inside)
-        if stance:
-            errors.append(abs(measured))
-            jumps.append(abs(command - last))
-        last = command
-    return max(errors), jumps[0]
+    commands, outputs, _ = simulated(loop, lambda k: offset if k < 200 else 0.0, 600, 200)
+    return np.abs(outputs[200:]).max(), abs(commands[200] - commands[199])
 
 
 def test_switch_with_a_mismatch_of_10_newton():
@@ -54,27 +63,18 @@ def test_switch_with_a_mismatch_of_10_newton():
     assert with_jump < 10.0 < 150.0 < plain_jump
 
 
-def test_without_mismatch_there_is_nothing_to_do():
+def test_switch_without_mismatch_has_no_transient():
     assert switched(compensated(), 0.0) == (0.0, 0.0)
     assert switched(compensated().without(), 0.0) == (0.0, 0.0)
 
 
 def test_in_charge_and_unlimited_it_is_the_plain_controller():
-    loop, rig = compensated(-1e9, 1e9, NONE), discrete(PLANT, PERIOD, "zoh")
-    plain = loop.without()
-    states = [one.initial_state() for one in (loop, plain)]
-    inside = [rig.initial_state(), rig.initial_state()]
-    for k in range(300):
-        reference = 20.0 * np.sin(0.03 * k)
-        commands = []
-        for i, one in enumerate((loop, plain)):
-            measured = float(inside[i] @ rig.c)
-            command = float(one.output(reference, measured, states[i]))
-            states[i] = one.advance(reference, measured, command, states[i])
-            inside[i] = rig.advance(command, inside[i])
-            commands.append(command)
-        assert commands[0] == pytest.approx(commands[1], abs=1e-9)
-    np.testing.assert_array_equal(states[0].model, np.zeros(7))
+    loop = compensated(-1e9, 1e9, NONE)
+    (ours, _, state), (plain, _, _) = (
+        simulated(one, lambda k: 20.0 * np.sin(0.03 * k), 300) for one in (loop, loop.without())
+    )
+    np.testing.assert_allclose(ours, plain, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(state.model, np.zeros(7))
 
 
 def test_idle_controller_sees_the_loop_it_would_have_closed():
@@ -94,26 +94,14 @@ def test_idle_controller_sees_the_loop_it_would_have_closed():
 
 
 def test_limits_cause_no_windup_of_the_controller():
-    rig = discrete(PLANT, PERIOD, "zoh")
-
     def time_back(loop: Bumpless) -> int:
-        inside, state, back = rig.initial_state(), loop.initial_state(), 0
-        for k in range(800):
-            reference = 100.0 if k < 300 else 0.0  # 100 N needs 135 kPa, the limit is 50
-            measured = float(inside @ rig.c)
-            command = float(loop.output(reference, measured, state))
-            assert -50.0 <= command <= 50.0
-            state = loop.advance(reference, measured, command, state)
-            inside = rig.advance(command, inside)
-            back += int(k >= 300 and abs(measured) > 5.0)
-        return back
+        # 100 N needs 135 kPa, the limit is 50
+        commands, outputs, _ = simulated(loop, lambda k: 100.0 if k < 300 else 0.0, 800)
+        assert np.abs(commands).max() <= 50.0
+        return int(np.sum(np.abs(outputs[300:]) > 5.0))
 
-    assert (
-        time_back(compensated(-50.0, 50.0))
-        < 150
-        < 300
-        < time_back(compensated(-50.0, 50.0).without())
-    )
+    limited = compensated(-50.0, 50.0)
+    assert time_back(limited) < 150 < 300 < time_back(limited.without())
 
 
 def test_rows_are_independent():
@@ -144,8 +132,6 @@ def test_direct_gain_acts_only_as_a_factor_of_the_state_gain():
     ],
 )
 def test_bad_parts_are_refused(change, message):
-    from dataclasses import replace
-
     with pytest.raises(ValueError, match=message):
         replace(compensated(), **change)
 
@@ -155,16 +141,13 @@ def test_direct_gain_of_1_is_refused():
         BumplessGains(np.zeros(7), 1.0)
 
 
-# --- the inequality (cvxpy) -----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("decay", [0.0, 1.0, 3.0, 4.05])
 def test_printed_gains_satisfy_the_inequality(decay):
     pytest.importorskip("cvxpy")
     assert certificate(PLANT, GAINS, decay) > SMALLEST
 
 
-def test_nothing_satisfies_it_beyond_the_slowest_pole():
+def test_no_gains_satisfy_it_beyond_the_slowest_pole():
     pytest.importorskip("cvxpy")
     assert certificate(PLANT, GAINS, 4.06) < SMALLEST
     with pytest.raises(ValueError, match=r"below 4\.055"):

@@ -1,16 +1,37 @@
-"""Loop transfer recovery against its theory, and linear systems against theirs."""
+"""Loop transfer recovery and linear systems against theory and python-control."""
 
 from __future__ import annotations
 
+import importlib.util
 import math
 
+import control
 import numpy as np
 import pytest
+from scipy.linalg import solve_continuous_lyapunov
 
-from baselines.knee.published import printed_controller, printed_plant
-from baselines.linear.ltr import closed_loop_poles, design_ltr, loop_figures, sampled_figures
-from baselines.linear.systems import discrete as discretise
-from baselines.linear.systems import from_polynomials, from_roots, state_space
+from baselines.knee.published import (
+    CONTROLLER_DENOMINATOR,
+    CONTROLLER_NUMERATOR,
+    printed_controller,
+    printed_plant,
+)
+from baselines.linear.ltr import (
+    _regulator,
+    closed_loop_poles,
+    design_ltr,
+    integrator,
+    loop_figures,
+    sampled_figures,
+)
+from baselines.linear.reduction import residualised
+from baselines.linear.systems import (
+    DiscreteSystem,
+    discrete,
+    from_polynomials,
+    from_roots,
+    state_space,
+)
 from pam_envs.identification.frequency import fit_rational
 
 PLANT = printed_plant()
@@ -33,7 +54,7 @@ def test_system_from_roots_and_in_series():
     np.testing.assert_allclose((second * first)(1j * W), first(1j * W) * second(1j * W), rtol=1e-10)
 
 
-def test_recovered_loop_is_the_integrator_asked_for():
+def test_recovered_loop_is_the_target_integrator():
     w = np.geomspace(0.1, 26.2, 20)
     errors = []
     for weight in (1e-8, 1e-12, 1e-16):
@@ -45,12 +66,12 @@ def test_recovered_loop_is_the_integrator_asked_for():
     assert 1.7 < errors[0] / errors[1] < errors[1] / errors[2] < 3.2
 
 
-def test_weight_beyond_the_arithmetic_is_refused():
+def test_too_small_a_control_weight_is_refused():
     with pytest.raises(ValueError, match="too small for the arithmetic"):
         design_ltr(PLANT, 26.2, 1e-20)
 
 
-def test_recipe_gives_the_bandwidth_of_26_2():
+def test_design_has_the_published_bandwidth_of_26_2():
     figures = design_ltr(PLANT, 26.2, 1e-10).figures
     assert figures.bandwidth == pytest.approx(26.19, abs=0.015)
     assert figures.peak_tracking < 1.001
@@ -72,8 +93,8 @@ def test_closed_loop_is_stable_with_the_poles_of_filter_and_regulator(bandwidth,
     poles = closed_loop_poles(design.plant, design.controller)
     assert np.all(poles.real < 0.0)
     # separation: the filter keeps the plant's poles and one at the bandwidth
-    for wanted in [*PLANT.poles(), -bandwidth]:
-        assert np.min(np.abs(poles - wanted)) < 1e-2 * abs(wanted)
+    for expected in [*PLANT.poles(), -bandwidth]:
+        assert np.min(np.abs(poles - expected)) < 1e-2 * abs(expected)
 
 
 def test_figures_of_a_known_loop():
@@ -95,24 +116,24 @@ def test_first_order_loop_has_no_peak():
 
 def test_discrete_controller_keeps_integrator_and_response():
     controller = printed_controller()
-    discrete = discretise(controller, 0.01)
-    assert np.max(np.abs(np.linalg.eigvals(discrete.a))) == pytest.approx(1.0, abs=1e-9)
+    sampled = discrete(controller, 0.01)
+    assert np.max(np.abs(np.linalg.eigvals(sampled.a))) == pytest.approx(1.0, abs=1e-9)
     w = np.array([0.5, 5.0, 20.0])
-    np.testing.assert_allclose(discrete.response(w), controller(1j * w), rtol=0.012)
+    np.testing.assert_allclose(sampled.response(w), controller(1j * w), rtol=0.012)
 
 
-def test_step_is_the_difference_equation_for_rows_and_for_one():
-    discrete = discretise(printed_controller(), 0.01)
+def test_rows_of_a_discrete_system_are_independent():
+    controller = discrete(printed_controller(), 0.01)
     errors = np.random.default_rng(0).normal(size=(30, 4))
-    rows, one = discrete.initial_state(4), discrete.initial_state()
+    rows, one = controller.initial_state(4), controller.initial_state()
     for error in errors:
-        many, rows = discrete.step(error, rows)
-        single, one = discrete.step(error[2], one)
+        many, rows = controller.step(error, rows)
+        single, one = controller.step(error[2], one)
         assert many[2] == pytest.approx(float(single), rel=1e-12, abs=1e-12)
 
 
-def test_rest_state_rests():
-    held = discretise(PLANT, 0.01, "zoh")
+def test_rest_state_is_an_equilibrium():
+    held = discrete(PLANT, 0.01, "zoh")
     state = held.rest_state(200.0)
     assert held.output(0.0, state) == pytest.approx(200.0 * PLANT.dcgain())
     np.testing.assert_allclose(held.advance(200.0, state), state, rtol=1e-12, atol=1e-12)
@@ -126,21 +147,26 @@ def test_sampling_and_delay_cost_phase_as_delays_do():
     assert lost == pytest.approx(0.005 * smooth.crossover, rel=0.1)  # half a period of the hold
     lost = sampled.phase_margin - late.phase_margin
     assert lost == pytest.approx(0.01 * sampled.crossover, rel=1e-3)
-    assert sampled_figures(PLANT, design.discrete(0.01), 0.9 * sampled.delay_margin).bandwidth > 0.0
+    assert (
+        sampled_figures(
+            PLANT, discrete(design.controller, 0.01), 0.9 * sampled.delay_margin
+        ).bandwidth
+        > 0.0
+    )
 
 
 def test_delay_margin_is_where_the_sampled_loop_becomes_unstable():
-    discrete = discretise(printed_controller(), 0.01)
-    plant = discretise(PLANT, 0.01, "zoh")
-    margin = sampled_figures(PLANT, discrete).delay_margin
+    controller = discrete(printed_controller(), 0.01)
+    plant = discrete(PLANT, 0.01, "zoh")
+    margin = sampled_figures(PLANT, controller).delay_margin
 
     def growth(delay: int) -> float:
         """Return the size of the error after 20 s over that after 10 s."""
-        inside, state = plant.initial_state(), discrete.initial_state()
+        inside, state = plant.initial_state(), controller.initial_state()
         waiting, sizes = [0.0] * delay, []
         for _ in range(2000):
             error = 1.0 - float(inside @ plant.c)
-            command, state = discrete.step(error, state)
+            command, state = controller.step(error, state)
             waiting.append(float(command))
             inside = plant.advance(waiting.pop(0), inside)
             sizes.append(abs(error))
@@ -151,8 +177,8 @@ def test_delay_margin_is_where_the_sampled_loop_becomes_unstable():
     assert growth(math.ceil(steps) + 1) > 2.0
 
 
-def test_frequency_response_to_controller():
-    """The whole way: a noisy response, a fit of low order, a loop on the true plant."""
+def test_controller_from_a_noisy_frequency_response_is_stable_on_the_plant():
+    """A noisy response, a fit of low order, a loop on the true plant."""
     rng = np.random.default_rng(2)
     w = 2.0 * np.pi * np.geomspace(0.1, 2.0, 40)
     noise = 1.0 + 0.01 * (rng.normal(size=40) + 1j * rng.normal(size=40))
@@ -186,4 +212,76 @@ def test_bad_systems_are_refused():
     with pytest.raises(ValueError, match=r"(?i)proper"):
         from_polynomials([1.0, 2.0, 3.0], [1.0, 1.0])
     with pytest.raises(ValueError, match="period is 0"):
-        discretise(PLANT, 0.0)
+        discrete(PLANT, 0.0)
+
+
+def test_cost_of_the_regulated_loop_is_the_riccati_solutions():
+    scaled = state_space(PLANT.A / 10.0, PLANT.B / 10.0, PLANT.C)
+    augmented, weight = scaled * integrator(), 1e-4
+    gain = _regulator(augmented, weight, 1.0)
+    q = augmented.C.T @ augmented.C
+    riccati = control.care(augmented.A, augmented.B, q, [[weight]], method="scipy")[0]
+    closed = augmented.A - augmented.B @ gain
+    cost = solve_continuous_lyapunov(closed.T, -(q + weight * gain.T @ gain))
+    for start in np.eye(augmented.nstates):
+        assert start @ cost @ start == pytest.approx(start @ riccati @ start, rel=1e-3)
+
+
+def test_recovered_loop_tends_to_the_phase_margin_of_an_integrator():
+    designs = [design_ltr(PLANT, 26.2, weight) for weight in (1e-6, 1e-10, 1e-14)]
+    phases = [np.degrees(design.figures.phase_margin) for design in designs]
+    assert 60.0 < phases[0] < phases[1] < phases[2] < 90.0
+    assert phases[2] > 79.0
+
+
+def test_margins_are_those_of_the_rational_loop():
+    plant, controller = PLANT, printed_controller()
+    gain, phase, distance, _, crossover, _ = control.stability_margins(plant * controller)
+    figures = loop_figures(lambda w: plant(1j * w) * controller(1j * w))
+    assert figures.gain_margin == pytest.approx(gain, rel=1e-6)
+    assert np.degrees(figures.phase_margin) == pytest.approx(phase, rel=1e-6)
+    assert figures.crossover == pytest.approx(crossover, rel=1e-6)
+    assert figures.peak_sensitivity == pytest.approx(1.0 / distance, rel=1e-6)
+
+
+def test_balanced_form_keeps_zeros_that_the_plain_companion_form_loses():
+    exact = np.sort_complex(np.roots(CONTROLLER_NUMERATOR))
+    plain = control.ss(control.tf(CONTROLLER_NUMERATOR, CONTROLLER_DENOMINATOR), method="scipy")
+
+    def error(zeros):
+        return max(np.min(np.abs(zeros - zero)) / abs(zero) for zero in exact)
+
+    assert error(printed_controller().zeros()) < 1e-10
+    if importlib.util.find_spec("slycot") is None:
+        assert error(plain.zeros()) > 1e-2
+
+
+def test_discrete_system_agrees_with_python_control():
+    system = discrete(printed_controller(), 0.01)
+    sampled = control.ss(system.a, system.b[:, None], system.c[None, :], system.d, 0.01)
+    inputs = np.random.default_rng(0).normal(size=50)
+    outputs = control.forced_response(sampled, inputs=inputs).outputs
+    state = system.initial_state()
+    for value, expected in zip(inputs, outputs, strict=True):
+        output, state = system.step(value, state)
+        assert output == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_lanes_are_single_systems():
+    poles = (2.0, 5.0, 23.0)
+    singles = [discrete(from_roots([], [-pole, -2 * pole], 1.0), 0.01) for pole in poles]
+    lanes, u = DiscreteSystem.stacked(singles), np.array([[1.0, -2.0, 0.5]] * 2)
+    state = lanes.rest_state(u)
+    np.testing.assert_allclose(lanes.advance(u, state), state, atol=1e-12)
+    for k, single in enumerate(singles):
+        np.testing.assert_array_equal(
+            lanes.output(u, state)[:, k], single.output(u[:, k], state[:, k])
+        )
+
+
+def test_residualisation_agrees_with_slicot():
+    pytest.importorskip("slycot")
+    system = from_roots([-4.0, -40.0], [-1.0, -5.0, -30.0, -200.0], 2.0)
+    w = 1j * np.geomspace(1e-2, 1e3, 50)
+    theirs = control.balred(system, 2, method="matchdc")
+    np.testing.assert_allclose(residualised(system, 2)[0](w), theirs(w), rtol=1e-9)

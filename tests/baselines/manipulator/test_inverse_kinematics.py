@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.manipulator.redundancy import POSE, InverseKinematics, compare
+from baselines.core.entry import Spec
+from baselines.manipulator.redundancy import POSE, compare, make_inverse_kinematics
 from pam_envs.mechanics.redundancy.resolution import LIMIT, UnreachablePose, resolve
-from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.parameters import Signal, Signals
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.references.path import PATHS
 
-ARM = SerialChain.uniform()
+PLANT = RedundantManipulator.paper()
+ARM = PLANT.chain
 PATH = PATHS[-1]
 NAMES = [*(f"angle_{k}" for k in range(6)), *(f"reference_{p}" for p in POSE)]
 AHEAD = [f"reference_{p}_1" for p in POSE]
@@ -19,6 +21,7 @@ SIGNALS = Signals(
     Signal(name, "1", -2.0, 2.0, i, i % 2 == 0) for i, name in enumerate(NAMES + AHEAD)
 )
 ACTIONS = Signals(Signal(f"angle_set_point_{k}", "rad", -LIMIT, LIMIT, k) for k in range(6))
+SPEC = Spec(PLANT, SIGNALS, ACTIONS)
 
 
 def observation(angles: np.ndarray, pose: np.ndarray, ahead: np.ndarray) -> np.ndarray:
@@ -34,7 +37,7 @@ def test_set_points_are_those_of_the_plan() -> None:
     line = PATH.angles()
     poses = ARM.pose(line)
     planned = resolve(ARM, poses, start=line[0])
-    follower, state = InverseKinematics(ARM, SIGNALS, ACTIONS), None
+    follower, state = make_inverse_kinematics(SPEC), None
     for k in range(40):
         seen = observation(line[0], poses[k], poses[k + 1])
         action, state = follower.predict(seen, state)
@@ -47,7 +50,7 @@ def test_previewed_pose_is_the_target() -> None:
     line = PATH.angles()
     poses = ARM.pose(line[:2])
     seen = observation(line[0], poses[0], poses[1])
-    action, _ = InverseKinematics(ARM, SIGNALS, ACTIONS, preview=1).predict(seen)
+    action, _ = make_inverse_kinematics(SPEC, preview=1).predict(seen)
     wanted = resolve(ARM, poses[1:], start=line[0]).angles[0]
     np.testing.assert_allclose(set_points(action), wanted, atol=1e-6)
 
@@ -55,7 +58,7 @@ def test_previewed_pose_is_the_target() -> None:
 def test_rows_of_a_batch_are_independent() -> None:
     lines = [path.angles() for path in PATHS]
     poses = [ARM.pose(line) for line in lines]
-    follower = InverseKinematics(ARM, SIGNALS, ACTIONS, weighted=False)
+    follower = make_inverse_kinematics(SPEC, weighted=False)
     state, alone = None, [None] * 3
     for k in range(4):
         rows = [observation(q[0], p[k], p[k]) for q, p in zip(lines, poses, strict=True)]
@@ -69,7 +72,7 @@ def test_rows_of_a_batch_are_independent() -> None:
 def test_a_pose_out_of_reach_leaves_the_set_points_and_is_counted() -> None:
     line = PATH.angles()
     good, far = ARM.pose(line[0]), np.array([0.0, 0.0, 1.7, 0.0, 0.0, 1.0])
-    follower = InverseKinematics(ARM, SIGNALS, ACTIONS)
+    follower = make_inverse_kinematics(SPEC)
     first, state = follower.predict(observation(line[0], good, good))
     held, state = follower.predict(observation(line[0], far, far), state)
     np.testing.assert_array_equal(held, first)

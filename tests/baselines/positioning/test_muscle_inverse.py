@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.positioning.inverse import aims_of, preview_weights
+from baselines.positioning.inverse import aims_of
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.baselines.conftest import QUIET, SECONDS, built, make_env, quiet, rollout
 
@@ -48,14 +48,8 @@ def test_preview_removes_the_delay():
     assert rms[0] < 1e-5 < 1e-4 < rms[1]
 
 
-def test_preview_weights_interpolate():
-    np.testing.assert_allclose(preview_weights(5, 0.04, 0.1), [0, 0, 0.5, 0.5, 0, 0])
-    np.testing.assert_allclose(preview_weights(2, 0.04, 0.5), [0, 0, 1])
-    np.testing.assert_allclose(preview_weights(0, 0.04, 0.1), [1])
-
-
 def test_later_aims_are_due_after_longer_travel():
-    aims, due = aims_of(5, 0.04, 0.09)
+    aims, due = aims_of(0.04 * np.arange(6), 0.09)
     np.testing.assert_allclose(aims.sum(axis=1), 1.0)
     assert due[0] == 0.0 and np.all(np.diff(due) > 0.0) and len(due) == 4
 

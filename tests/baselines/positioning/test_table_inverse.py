@@ -1,4 +1,4 @@
-"""Controllers from the published tables, as printed and refitted."""
+"""Controllers from the published tables, as printed and refitted; selection of the branch."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from baselines.positioning.contraction_tables import (
     published_inverse,
     table_6_inverse,
 )
+from baselines.positioning.table_inverse import DEAD_BAND, first_branch, next_branch
 from tests.baselines.conftest import built, make_env, quiet, rollout
 
 
@@ -23,7 +24,7 @@ def _held(name: str, load: float, levels: tuple[float, ...]) -> np.ndarray:
     return np.abs(record["output"] - record["reference"])[58::60]
 
 
-def test_equation_11_as_printed_fails_by_8_mm_and_its_refit_does_not():
+def test_equation_11_as_printed_errs_by_8_mm_and_its_refit_by_less_than_1():
     levels = (2.0, 14.0)
     assert _held("plc_as_printed", 4.55, levels).max() > 8e-3
     assert _held("plc_refitted", 4.55, levels).max() < 1e-3
@@ -43,17 +44,17 @@ def test_the_other_inflation_equations_as_printed_are_usable():
 )
 def test_looked_up_set_points_are_the_curves(name, curves):
     env = make_env(normalize=False, load=4.55)
-    controller, wanted = built(name, env), np.linspace(0.5e-3, 14e-3, 101)
+    controller, targets = built(name, env), np.linspace(0.5e-3, 14e-3, 101)
     observation, _ = env.reset(seed=1)
-    for x in wanted:
+    for x in targets:
         observation[4] = x  # the branch rises with it
-        expected = np.clip(curves.pressure(float(observation[4]), True, 4.55), 0.0, 6e5)
+        expected = np.clip(curves(float(observation[4]), True, 4.55), 0.0, 6e5)
         observation[0] = 0.0
         action, _ = controller.predict(observation)
         assert action[0] == pytest.approx(float(expected), abs=0.1)
 
 
-def test_a_small_reversal_jumps_to_the_other_branch_of_the_major_loop():
+def test_small_reversal_jumps_to_the_other_branch_of_the_major_loop():
     reference = np.repeat([8e-3, 7.8e-3], [200, 100])
     env = make_env(
         plant=quiet("maxwell_slip"), load=2.55, start="rest", reference=reference,
@@ -62,3 +63,49 @@ def test_a_small_reversal_jumps_to_the_other_branch_of_the_major_loop():
     jump, right = (rollout(env, built(name, env)) for name in ("table", "inverse"))
     assert jump["output"][195] - jump["output"][-1] > 4 * 2e-4
     assert right["output"][195] - right["output"][-1] == pytest.approx(2e-4, abs=1e-5)
+
+
+def _taken(reference, contraction=0.0):
+    branch = first_branch(np.array([reference[0]]), np.array([contraction]))
+    taken = []
+    for r in reference:
+        branch = next_branch(branch, np.array([r]))
+        taken.append(bool(branch.inflating[0]))
+    return np.array(taken)
+
+
+def test_start_goes_towards_the_reference():
+    assert _taken([5e-3], contraction=2e-3)[0]
+    assert not _taken([5e-3], contraction=8e-3)[0]
+
+
+def test_steps_choose_at_once_and_keep_while_held():
+    steps = np.repeat([2e-3, 8e-3, 5e-3, 6e-3], 50)
+    expected = np.repeat([True, True, False, True], 50)
+    np.testing.assert_array_equal(_taken(steps), expected)
+
+
+def test_ramp_turns_after_the_dead_band_however_slow():
+    ramp = 5e-3 - 1e-7 * np.arange(2000)  # a thousandth of the dead band a period and below
+    taken = _taken(ramp)
+    assert np.flatnonzero(~taken)[0] == np.flatnonzero(ramp < ramp[0] - DEAD_BAND)[0]
+    assert not taken[-1]
+
+
+def test_small_reversals_and_noise_keep_the_branch():
+    rng = np.random.default_rng(0)
+    rise = np.linspace(1e-3, 10e-3, 500) + rng.uniform(-0.45, 0.45, 500) * DEAD_BAND
+    assert _taken(rise).all()
+
+
+def test_reversal_is_measured_from_the_extremum():
+    creep = np.concatenate([[6e-3, 6e-3 - 0.9 * DEAD_BAND], [6e-3 - 1.2 * DEAD_BAND]])
+    np.testing.assert_array_equal(_taken(creep), [True, True, False])
+
+
+def test_rows_are_independent_and_the_old_branch_is_unchanged():
+    branch = first_branch(np.array([5e-3, 5e-3]), np.zeros(2))
+    after = next_branch(branch, np.array([4e-3, 6e-3]))
+    np.testing.assert_array_equal(after.inflating, [False, True])
+    np.testing.assert_array_equal(branch.inflating, [True, True])
+    np.testing.assert_array_equal(branch.extremum, [5e-3, 5e-3])

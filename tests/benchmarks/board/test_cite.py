@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from baselines.core.entry import Entry
-from baselines.trivial import make_zero
+from baselines.trivial import make_constant
 from benchmarks.__main__ import main
 from benchmarks.board import cite
 from benchmarks.runs import rows
@@ -103,7 +103,8 @@ def test_row_is_cited_with_its_identity_and_command(
 def test_author_is_that_of_the_catalogue(
     track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
-    entry = Entry("with an integrator", "nominal model", make_zero, author="Doe, J. and Roe, R.")
+    people = "Doe, J. and Roe, R."
+    entry = Entry("with an integrator", "nominal model", make_constant, author=people)
     monkeypatch.setitem(bench_fakes.CONTROLLERS, "integral", entry)
     (path,) = score(track, folder, "integral").rows
     assert main(["cite", str(path)]) == 0

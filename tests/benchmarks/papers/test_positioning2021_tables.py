@@ -37,6 +37,29 @@ PRINTED_DEVIATIONS = {
 """Column "Standard Deviation" of Tables 3 to 5 [mm]."""
 
 
+def _fit_errors(table: np.ndarray, measured: list) -> list[tuple[float, float, float]]:
+    """Return RMS, largest residual and determination of six cubics on (argument, value) pairs."""
+    found = []
+    for cubic, (x, y) in zip(table.reshape(6, 4), measured, strict=True):
+        error = np.polyval(cubic, x) - y
+        total = np.sum((y - y.mean()) ** 2)
+        determination = 1.0 - np.sum(error**2) / total
+        found.append((np.sqrt(np.mean(error**2)), np.abs(error).max(), determination))
+    return found
+
+
+def _forward_errors(table: np.ndarray) -> list[tuple[float, float, float]]:
+    """Return the errors [mm] of cubics x(p) on the mean readings, in the order of Eqs. 1 to 6."""
+    branches = [TABLE.branch(load, b) for load in TABLE.loads for b in curves.BRANCHES]
+    return _fit_errors(table, [(p / BAR, x.mean(axis=1) / MM) for p, x in branches])
+
+
+def _table_6_errors(table: np.ndarray) -> list[tuple[float, float, float]]:
+    """Return the errors [bar] of cubics p(x) on Table 6 as printed, in the order of Eqs. 7-12."""
+    rows = curves.TABLE_6_PRESSURE.reshape(6, 7)
+    return _fit_errors(table, [(curves.TABLE_6_CONTRACTION, row) for row in rows])
+
+
 def _numbers(text: str) -> np.ndarray:
     return np.array([float(one) for one in text.split()])
 
@@ -100,35 +123,32 @@ REFITTED_FORWARD = {
 
 @pytest.mark.parametrize("equation", PUBLISHED_FORWARD)
 def test_forward_equations_as_printed(equation):
-    found = errors.forward_error_table()["published"][equation - 1]
-    rms, largest, determination = PUBLISHED_FORWARD[equation]
-    assert found.equation == equation
-    assert found.rms / MM == pytest.approx(rms, abs=MILLI)
-    assert found.largest / MM == pytest.approx(largest, abs=MILLI)
-    digits = 3 if equation == 3 else 4
-    assert round(found.determination, digits) == determination
+    *residuals, determination = PUBLISHED_FORWARD[equation]
+    *found, fitted = _forward_errors(curves.PUBLISHED_FORWARD)[equation - 1]
+    assert found == pytest.approx(residuals, abs=MILLI)
+    assert round(fitted, 3 if equation == 3 else 4) == determination
 
 
 @pytest.mark.parametrize("equation", REFITTED_FORWARD)
 def test_forward_equations_refitted(equation):
     coefficients, residuals = REFITTED_FORWARD[equation]
-    found = curves.fitted_forward(TABLE).coefficients.reshape(6, 4)[equation - 1, ::-1]
+    refit = curves.fitted_forward(TABLE)
+    found = refit.reshape(6, 4)[equation - 1, ::-1]
     np.testing.assert_allclose(found, coefficients, rtol=0, atol=MILLI)
     if residuals:
-        fit = errors.forward_error_table()["refit"][equation - 1]
-        assert [fit.rms / MM, fit.largest / MM] == pytest.approx(residuals, abs=MILLI)
+        assert _forward_errors(refit)[equation - 1][:2] == pytest.approx(residuals, abs=MILLI)
 
 
 def test_equation_3_is_a_copy_of_equation_1_and_its_refit_has_the_claimed_determination():
     printed = curves.PUBLISHED_FORWARD
     np.testing.assert_array_equal(printed[1, 0], printed[0, 0])
-    assert errors.forward_error_table()["refit"][2].determination == pytest.approx(0.997, abs=5e-4)
+    refit = _forward_errors(curves.fitted_forward(TABLE))
+    assert refit[2][2] == pytest.approx(0.997, abs=5e-4)
 
 
 def test_equation_5_is_good_to_4_bar_and_low_above():
     pressure, inflated, _ = _mean_loop(4.55)
-    found = curves.published_forward().contraction(pressure * BAR, True, 4.55) / MM
-    error = found - inflated
+    error = np.polyval(curves.PUBLISHED_FORWARD[2, 0], pressure) - inflated
     assert np.abs(error[pressure <= 4.0]).max() <= 0.16 + 1e-3
     high = error[(pressure >= 4.5) & (pressure <= 5.5)]
     assert [high.min(), high.max()] == pytest.approx([-0.62, -0.42], abs=5e-3)
@@ -136,7 +156,7 @@ def test_equation_5_is_good_to_4_bar_and_low_above():
 
 def test_equation_6_is_its_own_refit_cut_after_three_decimals():
     np.testing.assert_allclose(
-        curves.fitted_forward(TABLE).coefficients[2, 1],
+        curves.fitted_forward(TABLE)[2, 1],
         curves.PUBLISHED_FORWARD[2, 1],
         rtol=0,
         atol=1e-3,
@@ -157,22 +177,20 @@ INVERSE_ON_TABLE_6 = {
 @pytest.mark.parametrize("equation", INVERSE_ON_TABLE_6)
 def test_inverse_equations_on_table_6(equation):
     rms, largest, coefficients, refitted = INVERSE_ON_TABLE_6[equation]
-    found = errors.table_6_error_table()
-    printed = found["published"][equation - 7]
-    assert [printed.rms / BAR, printed.largest / BAR] == pytest.approx([rms, largest], abs=MILLI)
-    assert found["refit"][equation - 7].rms / BAR == pytest.approx(refitted, abs=MILLI)
-    fit = curves.table_6_inverse(corrected=False).coefficients.reshape(6, 4)[equation - 7]
-    np.testing.assert_allclose(fit, coefficients, rtol=0, atol=0.5001e-5)
+    printed = _table_6_errors(curves.PUBLISHED_INVERSE)[equation - 7]
+    assert printed[:2] == pytest.approx((rms, largest), abs=MILLI)
+    fit = curves.table_6_cubics(corrected=False)
+    assert _table_6_errors(fit)[equation - 7][0] == pytest.approx(refitted, abs=MILLI)
+    np.testing.assert_allclose(fit.reshape(6, 4)[equation - 7], coefficients, rtol=0, atol=5.001e-6)
 
 
 def test_published_fit_contains_the_wrong_entry_of_table_6():
     """With 1.43 bar the paper's determination comes out; Table 5 itself says 2.05 bar."""
-    fits = errors.table_6_error_table()
-    assert round(fits["refit"][4].determination, 4) == 0.9972
-    assert round(fits["refit"][5].determination, 4) == 0.9996
+    fits = _table_6_errors(curves.table_6_cubics(corrected=False))
+    assert [round(fit[2], 4) for fit in fits[4:]] == [0.9972, 0.9996]
     pressure, inflated, _ = _mean_loop(4.55)
     assert np.interp(2.0, inflated, pressure) == pytest.approx(2.05, abs=5.1e-3)
-    corrected = curves.table_6_inverse().coefficients[2, 0]
+    corrected = curves.table_6_cubics()[2, 0]
     np.testing.assert_allclose(corrected, (0.0018, -0.0456, 0.6347, 0.9557), rtol=0, atol=0.5e-4)
 
 
@@ -215,7 +233,9 @@ def test_printed_equation_11_is_worse_than_ignoring_the_hysteresis(positioning):
 
 
 def test_pchip_reaches_what_the_repeats_allow(positioning):
-    floor = errors.repeatability_floor(TABLE) / MM
+    cycles = [TABLE.cycles(load)[1] / MM for load in TABLE.loads]
+    away = [(x - x.mean(axis=1, keepdims=True)) * x.shape[1] / (x.shape[1] - 1) for x in cycles]
+    floor = np.sqrt(np.mean(np.concatenate(away) ** 2))  # of a repeat from the mean of the others
     assert floor == pytest.approx(0.165, abs=MILLI)
     assert positioning["pchip"].rms / MM == pytest.approx(floor, abs=0.01)
 
@@ -225,7 +245,7 @@ def test_inverses_of_curves_rise_with_the_contraction(make):
     desired = np.linspace(0.0, 16e-3, 801)
     for load in (0.0, 1.0, 2.55, 3.3, 4.55, 6.0):
         for inflating in curves.BRANCHES:
-            pressure = make(TABLE).pressure(desired, inflating, load)
+            pressure = make(TABLE)(desired, inflating, load)
             assert np.all(np.diff(pressure) >= 0.0)
             assert -1e-6 <= pressure.min() < pressure.max() <= 6e5 + 1e-6
 
@@ -235,7 +255,7 @@ def test_pchip_gives_back_the_readings_it_was_made_from():
     for load in TABLE.loads:
         for inflating in curves.BRANCHES:
             pressure, contraction = TABLE.branch(load, inflating)
-            found = inverse.pressure(contraction.mean(axis=1), inflating, load)
+            found = inverse(contraction.mean(axis=1), inflating, load)
             np.testing.assert_allclose(found, pressure, rtol=0, atol=1e-6)
 
 
@@ -243,22 +263,20 @@ def test_less_pressure_holds_a_contraction_when_deflating():
     desired = np.linspace(1e-3, 13e-3, 121)
     inverse = curves.pchip_inverse(TABLE)
     for load in (0.0, 1.2, 2.55, 3.5, 4.55):
-        assert np.all(
-            inverse.pressure(desired, True, load) > inverse.pressure(desired, False, load)
-        )
+        assert np.all(inverse(desired, True, load) > inverse(desired, False, load))
 
 
 def test_loads_between_two_measured_ones_are_interpolated_and_others_clipped():
     inverse = curves.published_inverse()
-    at = {load: inverse.pressure(8e-3, True, load) for load in (0.0, 2.55, 4.55)}
-    assert inverse.pressure(8e-3, True, 3.55) == pytest.approx((at[2.55] + at[4.55]) / 2)
-    assert inverse.pressure(8e-3, True, 9.0) == at[4.55]
-    assert inverse.pressure(8e-3, True, -1.0) == at[0.0]
+    at = {load: inverse(8e-3, True, load) for load in (0.0, 2.55, 4.55)}
+    assert inverse(8e-3, True, 3.55) == pytest.approx((at[2.55] + at[4.55]) / 2)
+    assert inverse(8e-3, True, 9.0) == at[4.55]
+    assert inverse(8e-3, True, -1.0) == at[0.0]
 
 
 def test_arguments_broadcast():
     inverse = curves.pchip_inverse(TABLE)
     desired, inflating, load = np.array([4e-3, 8e-3]), np.array([[True], [False]]), [0.0, 4.55]
-    found = inverse.pressure(desired, inflating, load)
+    found = inverse(desired, inflating, load)
     assert found.shape == (2, 2)
-    assert found[1, 1] == inverse.pressure(8e-3, False, 4.55)
+    assert found[1, 1] == inverse(8e-3, False, 4.55)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
+from baselines.core.controller import encode_actions
 from baselines.trivial import Constant
 from benchmarks.runs import rollout, rows
 from benchmarks.scenarios.scenario import ScenarioSet, available
@@ -108,7 +110,7 @@ def test_samples_with_wrong_sensed_phase_are_not_scored(seen: float) -> None:
 
 def test_open_valve_does_not_reduce_emg() -> None:
     env: Any = gym.make("PAM/KneeWalk-v0", start="heel_contact", episode_seconds=16.0).unwrapped
-    full = Constant(tuple(env.action_signals), (4.5e5,))
+    full = Constant(partial(encode_actions, tuple(env.action_signals)), (4.5e5,))
     made = rollout.run(env, full, 0).signals
     window = (made["time"] > 5.0) & (made["time"] < 15.0 + 0.5 * PERIOD)
     ratios = metrics_knee.emg(made, window, PERIOD, "walk")

@@ -1,15 +1,20 @@
-"""PID of the muscle: SIMC gains, limits, closed loop."""
+"""SIMC rule and PID: formulas, limits, loops of joints, closed loop of the muscle."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from baselines.positioning.pid import Gains, pid_start, pid_step, simc
+from baselines.joint.feedback import closed_loop_time, pid_system, simc_joint
+from baselines.linear.ltr import loop_figures
+from baselines.linear.pid import DELAY_PERIODS, Gains, pid_start, pid_step, simc_rule
+from baselines.linear.systems import double_lag
+from baselines.positioning.pid import simc
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.baselines.conftest import QUIET, built, make_env, rollout
 
 GAINS = Gains(1e7, 2e8, 1e5, 0.005, 0.05)
+PERIOD, POLE = 0.01, 23.0
 
 
 def _run(errors, gains=GAINS, low=0.0, high=6e5):
@@ -20,7 +25,7 @@ def _run(errors, gains=GAINS, low=0.0, high=6e5):
     return np.array(outputs), state
 
 
-def test_starts_from_the_output_that_was_there():
+def test_pid_starts_from_the_present_output():
     assert _run([0.0, 0.0])[0] == pytest.approx([3e5, 3e5])
 
 
@@ -34,7 +39,7 @@ def test_limits_cause_no_windup(sign):
     assert abs(back[2000] - limit) > 1e4  # leaves the limit at the first sign of the error
 
 
-def test_without_back_calculation_it_would_stay_at_the_limit():
+def test_back_calculation_leaves_the_limit_earlier():
     patient = Gains(1e7, 2e8, 1e5, 0.005, 1e9)
     guarded, _ = _run([5e-3] * 200 + [-1e-3] * 3)
     wound, _ = _run([5e-3] * 200 + [-1e-3] * 3, patient, high=6e5)
@@ -62,7 +67,7 @@ def test_gains_are_those_of_the_simc_rule():
     assert slower.integral == pytest.approx(gains.integral / 2.0)
 
 
-def test_rule_gives_the_same_gains_again_and_lower_ones_for_a_longer_dead_time():
+def test_gains_are_reproducible_and_fall_with_the_dead_time():
     plant = SingleMuscle.mas10()
     assert simc(plant) == simc(SingleMuscle.mas10())
     assert simc(plant.replace({"regulator.dead_time": 0.1})).integral < simc(plant).integral
@@ -79,3 +84,34 @@ def test_closes_the_loop_without_oscillation(hysteresis, load):
     for end in (248, 498, 748, 998):
         assert np.abs(error[end - 50 : end]).max() < 2e-5
     assert record["output"][250:500].max() < 8e-3 + 0.2 * 5e-3  # overshoot below 20 %
+
+
+def test_formulas_of_the_rule_with_the_dead_time_as_recommendation():
+    law = simc_rule(2.0, 0.3, 0.05, 0.02, closed_loop_time=0.04)
+    assert law == pytest.approx((0.3 / (2.0 * 0.06), 0.24, 0.05))
+    assert simc_rule(2.0, 0.1, 0.0, 0.02).integral_time == 0.1
+    assert simc_rule(1.0, 0.3, 0.0, 0.02) == simc_rule(1.0, 0.3, 0.0, 0.02, 0.02)
+
+
+def test_closed_loop_of_an_arm_is_at_most_twice_as_fast_as_the_joint():
+    wait = DELAY_PERIODS * PERIOD
+    assert closed_loop_time(POLE, wait, in_arm=False) == wait
+    assert closed_loop_time(5.0, wait, in_arm=True) == pytest.approx(0.1)
+    assert closed_loop_time(50.0, wait, in_arm=True) == wait
+    assert closed_loop_time(POLE, wait, in_arm=False, smooth=True) == 1.0 / POLE
+
+
+@pytest.mark.parametrize(("smooth", "margin", "peak"), [(False, 51.7, 1.86), (True, 70.1, 1.35)])
+def test_loop_of_one_stage_has_margins_with_its_dead_time(smooth, margin, peak):
+    """With a whole period of computing, as on a rig; without the filter of D the peak were 1.59."""
+    law = simc_joint(1.0, POLE, PERIOD, smooth=smooth)
+    loop = double_lag(POLE) * pid_system(law)
+    late = loop_figures(lambda w: loop(1j * w) * np.exp(-1j * w * DELAY_PERIODS * PERIOD))
+    assert np.degrees(late.phase_margin) == pytest.approx(margin, abs=0.2)
+    assert late.peak_sensitivity == pytest.approx(peak, abs=0.01)
+
+
+def test_rule_without_the_filter_has_the_published_peak():
+    pace = 2.0 * DELAY_PERIODS * PERIOD  # the loop is exp(-theta s) / (2 theta s)
+    found = loop_figures(lambda w: np.exp(-0.5j * w * pace) / (1j * w * pace))
+    assert found.peak_sensitivity == pytest.approx(1.59, abs=0.005)

@@ -1,0 +1,139 @@
+"""Parts that all controllers of joints share: model, signals, gravity feedforward and preview.
+
+With preview, a controller reads the reference later by its own delay for slow references and half a
+control period of the hold, by linear interpolation of the previewed samples. Where the preview
+horizon is too short, as for the slow joints of an arm, the line from the present to the last sample
+is extrapolated.
+
+The loop of the pole-cancelling PI and the nominal model (:mod:`baselines.joint.loop`) is, at a
+damping of ``1 / sqrt(2)``,
+
+    T(s) = 1 / (1 + 2 (s / p) + 2 (s / p)^2)
+
+which equals ``exp(-2 s / p)`` up to the third order: for a smooth reference a pure delay of
+``2 / p``. (The double pole without a loop has the same delay, up to the second order.)
+
+The gravity feedforward changes the set-points such that they compensate the weight of links and
+payload of the nominal plant: the torque of the weight at the reference angles, and the set-point at
+which the muscles exert that torque there. In a manipulator the torque depends on the angles of all
+joints. Reference angles are used instead of sensed ones, which would be a feedback.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.ndimage import map_coordinates
+
+from baselines.core.controller import Array, RowController, preview_weights
+from baselines.core.entry import Entry, Spec
+from baselines.core.environments import JOINT
+from baselines.core.knobs import Bounds
+from baselines.joint.model import JointModel
+from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
+
+JOINT_ENTRY = partial(
+    Entry,
+    knowledge="nominal model",
+    citation="fluidic_muscles",
+    envs=JOINT,
+    plants=(AntagonisticJoint, RedundantManipulator),
+)
+MAX_EXTRAPOLATION = 2.0
+"""Largest extrapolation over the preview horizon."""
+PREVIEW_KNOBS: Bounds = {"lead": (0.25, 4.0)}
+"""Factor on the compensated delays."""
+ANGLES, TORQUES = 61, 81
+"""Size of the table of shifts."""
+LARGEST_TORQUE = 8.0
+"""End of the table [N m]; torques are clipped to it."""
+
+
+def double_pole_delays(poles: Sequence[float]) -> list[float]:
+    """Return the delays [s] of double poles [rad/s], and of the PI's loops around them."""
+    return [2.0 / pole for pole in poles]
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Gravity feedforward of a nominal plant; none without a plant."""
+
+    plant: Any = None
+
+    def shift(self, angles: Array, payload: Array) -> Array:
+        """Return the shift [rad] at angles (n_env, n_joints) with payloads [kg], (n_env,)."""
+        if self.plant is None:
+            return np.zeros_like(angles)
+        low, high = self.plant.angle_range
+        along = (np.clip(angles, low, high) - low) / (high - low) * (ANGLES - 1)
+        torque = np.clip(self._torque(angles, payload), -LARGEST_TORQUE, LARGEST_TORQUE)
+        across = (torque / LARGEST_TORQUE + 1.0) * 0.5 * (TORQUES - 1)
+        return np.asarray(map_coordinates(self._table, (along, across), order=1, mode="nearest"))
+
+    def _torque(self, angles: Array, payload: Array) -> Array:
+        """Return the torques [N m] that hold links and payload, shape (n_env, n_joints)."""
+        if self.plant.stages == 1:
+            return np.asarray(self.plant.weight_torque(angles, payload[:, None]), float)
+        return np.asarray(self.plant.chain.gravity_torque(angles, payload), float)
+
+    @cached_property
+    def _table(self) -> Array:
+        """Shifts [rad] by angle and torque."""
+        low, high = self.plant.angle_range
+        angle = np.linspace(low, high, ANGLES)[:, None]
+        torque = np.linspace(-LARGEST_TORQUE, LARGEST_TORQUE, TORQUES)[None, :]
+        return self.plant.shift_for(angle, self.plant.prestress, torque, high)
+
+
+class Parts(NamedTuple):
+    """Parts of a controller.
+
+    ``preview``, shape (n_joints or 1, n_samples), holds the weights of the samples of the
+    reference, the present one first.
+    """
+
+    model: JointModel
+    signals: JointSignalMap
+    gravity: Gravity
+    preview: Array
+
+
+@dataclass(frozen=True)
+class JointController(RowController):
+    """Base of the controllers of joints."""
+
+    parts: Parts
+
+    def start(self, observation: ArrayLike) -> tuple[JointView, Array]:
+        """Return an episode's first view, and its set-points [rad] without gravity feedforward."""
+        view = self.parts.signals.read(observation)
+        return view, view.set_point - self.parts.gravity.shift(view.angle, view.payload)
+
+    def read(self, observation: ArrayLike) -> tuple[JointView, Array, Array]:
+        """Return the view, the previewed references, and the gravity feedforward [rad]."""
+        view = self.parts.signals.read(observation)
+        reference = np.add.reduce(view.samples * self.parts.preview, axis=-1)
+        return view, reference, self.parts.gravity.shift(view.reference, view.payload)
+
+
+def make_parts(
+    spec: Spec[Any], model: JointModel, gravity: bool, delays: Sequence[float] | None
+) -> Parts:
+    """Return the parts of a controller.
+
+    ``gravity``: whether the set-points compensate the weight of the links and of the declared
+    payload; ``delays`` [s], without that of the hold, are previewed, None for no preview.
+    """
+    signals = make_joint_signal_map(spec.signals, spec.actions)
+    leads = (
+        [0.0] if delays is None else [spec.knob("lead") * d + 0.5 * model.period for d in delays]
+    )
+    preview = [preview_weights(signals.times, lead, MAX_EXTRAPOLATION) for lead in leads]
+    return Parts(model, signals, Gravity(spec.plant if gravity else None), np.array(preview))
