@@ -106,15 +106,15 @@ def test_without_pressure_valve_causes_are_isolable_or_not_testable(files: Files
         valve_closed=rig.valve_closed,
         **columns,
     )
-    told = diagnose(blind, rig=rig, progress=False, closed_loop=False)
-    assert "temperature" in told.causes
-    assert "pressure" not in told.report["error_after"]
-    assert any("there is no column pressure_bar" in w for w in told.report["warnings"])
+    result = diagnose(blind, rig=rig, progress=False, closed_loop=False)
+    assert "temperature" in result.causes
+    assert "pressure" not in result.report["error_after"]
+    assert any("there is no column pressure_bar" in w for w in result.report["warnings"])
     valve = {cause.name for cause in catalogue() if cause.in_valve}
-    listed = {entry["name"]: entry["reason"] for entry in told.report["not_testable"]}
-    found = told.report["isolability"]
+    listed = {entry["name"]: entry["reason"] for entry in result.report["not_testable"]}
+    found = result.report["isolability"]
     assert valve <= {*listed, *found["names"]}
-    assert not valve & set(told.causes)
+    assert not valve & set(result.causes)
     for name in valve - set(listed):
         k = found["names"].index(name)
         others = [c for i, c in enumerate(found["cosine"][k]) if i != k]

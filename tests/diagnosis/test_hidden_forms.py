@@ -79,9 +79,9 @@ def test_size_increases_continuously_with_amplitude(name, seed, short):
 
 def test_both_forms_of_each_effect_are_documented():
     rows = [line for line in catalogue.__doc__.splitlines() if line[:1].isalpha()]
-    told = {row.split()[0]: row[28:].strip() for row in rows}
+    documented = {row.split()[0]: row[28:].strip() for row in rows}
     for name in hidden.EFFECTS:
-        assert len(told[name]) > 20
+        assert len(documented[name]) > 20
 
 
 def test_flow_of_restriction_is_choked_then_elliptic_then_linear():
@@ -107,7 +107,7 @@ def test_muscle_volume_increases_with_contraction():
         assert slope > 0.0
 
 
-def test_what_the_muscle_takes_the_reservoir_loses_and_gets_back_through_the_orifice():
+def test_air_of_the_muscle_leaves_the_reservoir_and_returns_through_the_orifice():
     p, s = _rig(_effect("supply_droop"), 3.0)
     s.supply, s.pressure, s.strain, s.speed = p.supply - 1.0, 2.0, 0.05, 0.2
     before = s.supply
@@ -226,28 +226,28 @@ def test_bracket_and_foot_resonate_in_two_modes():
 def test_tray_and_scale_errors_increase_with_load():
     p, s = _rig(_effect("payload_error", tray_scale=0.2), 3.0)
 
-    def more(told: float) -> float:
-        hang(p, s, told)
+    def more(declared: float) -> float:
+        hang(p, s, declared)
         assert s.weight == pytest.approx(s.load / GRAVITY)
-        return s.load - told
+        return s.load - declared
 
     assert more(0.0) == 0.0
     assert 0.0 < more(0.05) < 0.02 * p.tray  # no switch
-    for told in (15.0, 30.0, 60.0):
-        hung = 1.0 - np.exp(-told / p.tray_rest)
-        assert more(told) == pytest.approx(p.tray * (hung + 0.2 * told / 30.0))
+    for load in (15.0, 30.0, 60.0):
+        hung = 1.0 - np.exp(-load / p.tray_rest)
+        assert more(load) == pytest.approx(p.tray * (hung + 0.2 * load / 30.0))
 
 
 def test_without_a_load_a_tray_only_rubs(short):
     base, effect = _base(), _effect("payload_error")
     idle = dataclasses.replace(short, load_N=np.zeros_like(short.load_N))
     shown, clean = (hidden.simulate(base, hide, idle) for hide in ([(effect, 4.0)], []))
-    loaded, told = (hidden.simulate(base, hide, short) for hide in ([(effect, 4.0)], []))
+    loaded, expected = (hidden.simulate(base, hide, short) for hide in ([(effect, 4.0)], []))
 
     def rms(one: dict, other: dict) -> float:
         return float(np.sqrt(np.mean((one["position_mm"] - other["position_mm"]) ** 2)))
 
-    assert 0.0 < rms(shown, clean) < 0.25 * rms(loaded, told)
+    assert 0.0 < rms(shown, clean) < 0.25 * rms(loaded, expected)
 
 
 def test_eyrings_drag_is_the_arsinh_of_the_speed():

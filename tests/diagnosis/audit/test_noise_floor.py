@@ -95,7 +95,6 @@ def test_noise_of_motion_counts_as_noise():
 
 
 def test_declared_noise_below_holds_is_not_used():
-    """An owner who is too sure of the sensor does not lower the floor."""
     sure = dataclasses.replace(RIG, contraction_noise=0.75 * NOISE["contraction"])
     floor = contraction(changed(1.0), sure)
     assert floor.source == "holds"

@@ -1,6 +1,6 @@
 """Generated parts of ``docs/diagnosis_causes.md``, from the declarations of the causes.
 
-The page has three parts between marks; the rest is written by hand. After a change of the catalogue
+The page has three generated parts between marks. After a change of the catalogue
 ``python -m tests.diagnosis.causes.causes_page`` updates the parts.
 """
 

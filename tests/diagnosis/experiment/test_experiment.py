@@ -81,7 +81,7 @@ def test_plans_respect_capabilities_of_the_rig():
 
 
 @pytest.mark.parametrize("means", [ABLE, POOR, Means(2e5, (5.0, 8.0), shut=True, warm=False)])
-def test_plans_stay_within_recorded_range(means):
+def test_plans_are_within_recorded_range(means):
     for plan in plans(means):
         assert set(plan.loads) <= set(means.loads)
         assert plan.command.max() <= means.full
@@ -90,7 +90,7 @@ def test_plans_stay_within_recorded_range(means):
         assert 30.0 < len(plan.command) * PERIOD <= 125.0
 
 
-def test_segments_are_what_is_run():
+def test_segments_describe_the_commands():
     for plan in plans(ABLE):
         assert sum(s["seconds"] for s in plan.segments) == pytest.approx(
             len(plan.command) * PERIOD, abs=0.05

@@ -1,7 +1,7 @@
 """Rigs that hide an effect in their recordings, independent of the library under test.
 
-Nothing here knows the library's plants: another muscle law, another friction, another integrator,
-and every effect in another mathematical form. The forms stand side by side in `catalogue`.
+Nothing here imports the library's plants: muscle law, friction, integrator and the mathematical
+form of every effect are others. `catalogue` compares the forms.
 """
 
 from .base import CONTRACTION_NOISE_MM, PRESSURE_NOISE_BAR, Base, draw_base

@@ -39,7 +39,7 @@ slip_step                   sigmoid or exponential in time     straight ramp
 wire_slack                  stretched exponential of the       straight ramp of the position
                             strain
 payload_error               scales wrong by a factor, tray on  constant extra mass wherever the
-                            a soft rest, rub of its guide      told load is above zero
+                            a soft rest, rub of its guide      declared load is above zero
 =========================== ================================== ==================================
 """
 

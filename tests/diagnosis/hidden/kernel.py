@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .kernel_air import fill
-from .kernel_motion import move, oscillate, outside, remember, snap
+from .kernel_motion import creep_step, move, oscillate, outside, snap
 from .kernel_muscle import effective, hang, pressure_gain, sliders, softness
 from .kernel_sensing import listen, position_mm, read
 from .kernel_tools import CREEP_STRIDE, STEP, jit
@@ -13,7 +13,7 @@ from .kernel_tools import CREEP_STRIDE, STEP, jit
 
 @jit
 def step(p, s, command, shut, heat):
-    """Move the rig on by one step under a command [bar] at a temperature [deg C]."""
+    """Advance the rig by one step under a command [bar] at a temperature [deg C]."""
     t = STEP * s.tick
     fill(p, s, command, shut, t)
     work = effective(p, s)
@@ -26,7 +26,7 @@ def step(p, s, command, shut, heat):
         shift = s.strain - before
         s.strand_grip = sliders(s.strands, p.strand_stiffness, p.strand_breaks, shift)
     if p.creep != 0.0 and s.tick % CREEP_STRIDE == 0:
-        remember(p, s, work)
+        creep_step(p, s, work)
     oscillate(p, s, acceleration)
     if p.buckle > 0.0:
         snap(p, s)
@@ -36,9 +36,9 @@ def step(p, s, command, shut, heat):
 
 
 @jit
-def start(p, s, told):
-    """Let the rig rest under its first load at 0 bar."""
-    hang(p, s, told)
+def start(p, s, load):
+    """Put the rig to rest under its first load at 0 bar."""
+    hang(p, s, load)
     s.strain = s.hang
     s.rest = s.hang
     s.supply = p.supply
@@ -54,18 +54,10 @@ def advance(p, s, command, shut, heat, steps):
 
 @jit
 def run(parameters, state, command, load, heat, shut, steps):
-    """Run a whole campaign.
+    """Run a campaign of (n,) commands [bar], loads [N] and temperatures [deg C].
 
-    Parameters
-    ----------
-    parameters, state : (1,) record arrays; the state is left at the end of the run.
-    command, load, heat, shut : (n,) arrays [bar, N, deg C, bool]
-    steps : int, steps of the integrator from one sample to the next
-
-    Returns
-    -------
-    (n, 3) array: reading of the contraction [mm] and the pressure [bar], true contraction [mm],
-    each taken before the command of its row acts.
+    Return the readings of contraction [mm] and pressure [bar] and the true contraction [mm], shape
+    (n, 3), each before the command of its row acts.
     """
     p, s = parameters[0], state[0]
     rows = np.empty((command.size, 3))

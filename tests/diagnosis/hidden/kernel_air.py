@@ -58,7 +58,7 @@ def queued(p, s, command):
 
 @jit
 def neighbour_dip(p, t):
-    """Return by how much another muscle on the same supply pulls the set-point [bar]."""
+    """Return the change of the setpoint by another muscle on the same supply [bar]."""
     phase = t / p.neighbour_period
     phase -= math.floor(phase)
     since_fill = phase * p.neighbour_period
@@ -71,7 +71,7 @@ def neighbour_dip(p, t):
 
 @jit
 def set_point(p, s, command, t):
-    """Return the pressure that the regulator aims at [bar]."""
+    """Return the setpoint of the regulator [bar]."""
     if p.dither > 0.0:
         command += p.dither * (2.0 / math.pi) * math.asin(math.sin(2 * math.pi * p.dither_hz * t))
     aim = p.gain * queued(p, s, command)
@@ -82,10 +82,10 @@ def set_point(p, s, command, t):
 
 @jit
 def driven(p, error):
-    """Return the error that the valve's coil can still drive, of limited force.
+    """Return the error that the valve's coil of limited force can drive.
 
-    Either its iron saturates, or a current limit leaves a small rest of the slope; a return
-    spring makes both leaner on one side.
+    Either its iron saturates, or a current limit leaves a small slope; a return spring makes the
+    limits unequal.
     """
     limit = (1.0 + math.copysign(p.slew_lean, error)) / p.slew
     if p.slew_kind > 0.5:
@@ -98,7 +98,7 @@ def driven(p, error):
 
 @jit
 def uncovered(p, error):
-    """Return what the spool opens: its lands overlap the ports, rounded, and leak a little."""
+    """Return the opening of a spool whose lands overlap the ports, rounded and leaking."""
     edge = p.overlap * p.overlap_edge
     past = abs(error) - p.overlap
     opened = 0.5 * (past + math.sqrt(past * past + edge * edge))
@@ -117,7 +117,7 @@ def volume(p, strain):
 
 @jit
 def supplied(p, s, rate, shut):
-    """Draw what the muscle takes from the reservoir; return the rate that is left [bar/s].
+    """Take the air of the muscle from the reservoir; return the remaining rate [bar/s].
 
     Balances of air in muscle and reservoir. The valve opens as far as it must, and not further
     than fully; the reservoir is fed through an orifice. Flows in volumes of the muscle at rest.
@@ -126,10 +126,10 @@ def supplied(p, s, rate, shut):
     stock, feed = s.supply + ATMOSPHERE, p.supply + ATMOSPHERE
     wide, slope = volume(p, s.strain)
     swallowed = absolute * slope * s.speed
-    wanted = wide * rate + swallowed
+    demand = wide * rate + swallowed
     taken = 0.0
-    if wanted > 0.0 and not shut:
-        taken = min(wanted, passed(p.critical, stock, absolute) / p.throat)
+    if demand > 0.0 and not shut:
+        taken = min(demand, passed(p.critical, stock, absolute) / p.throat)
         rate = min(rate, (taken - swallowed) / wide)
     filled = passed(p.critical, feed, stock) / p.recovery
     s.supply += STEP * (filled - p.draw * taken)
@@ -138,7 +138,7 @@ def supplied(p, s, rate, shut):
 
 @jit
 def valve_rate(p, s, error):
-    """Return how fast the regulator moves the pressure [bar/s]."""
+    """Return the rate of the regulated pressure [bar/s]."""
     if p.overlap > 0.0:
         error = uncovered(p, error)
     if p.slew > 0.0:
@@ -151,7 +151,7 @@ def valve_rate(p, s, error):
 
 @jit
 def behind(values, tick, steps):
-    """Return what was written into a ring so many steps ago, between two of them in proportion."""
+    """Return the value of a ring a number of steps ago, interpolated."""
     whole = int(steps)
     newer = values[(tick - whole) % TUBE]
     older = values[(tick - whole - 1) % TUBE]
@@ -160,10 +160,10 @@ def behind(values, tick, steps):
 
 @jit
 def resound(p, s):
-    """Send a wave down a closed tube and add a share of what swings at its end.
+    """Send a wave down a closed tube and add a share of the oscillation at its end.
 
-    The valve's end holds its pressure, the far one throws the wave back, a little weaker and
-    rounded by the wall; both ways take the same time.
+    The valve's end holds its pressure, the far one reflects the wave, weaker and rounded by the
+    wall; both ways take the same time.
     """
     tick = s.tick
     s.sent[tick % TUBE] = s.pressure - behind(s.returned, tick, p.line_trip)
@@ -176,7 +176,7 @@ def resound(p, s):
 
 @jit
 def fill(p, s, command, shut, t):
-    """Move the pressure, the supply and the waves in the line on by one step."""
+    """Advance pressure, supply and waves in the line by one step."""
     error = set_point(p, s, command, t) - s.pressure
     rate = 0.0 if shut else valve_rate(p, s, error)
     if p.throat > 0.0:

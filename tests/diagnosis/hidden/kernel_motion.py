@@ -74,7 +74,7 @@ def rub(p, s, push, lean, mass, damping):
 
 @jit
 def move(p, s, work, soft, extra):
-    """Move the load on by one step; speeds are strain rates [1/s]."""
+    """Advance the load by one step; speeds are strain rates [1/s]."""
     push = force(p, s, work, soft, s.strain) + extra
     stiff = (push - extra - force(p, s, work, soft, s.strain + NUDGE)) / NUDGE
     speed = s.speed
@@ -95,8 +95,8 @@ def move(p, s, work, soft, extra):
 
 
 @jit
-def remember(p, s, work):
-    """Move the slow hysteresis on by one stride."""
+def creep_step(p, s, work):
+    """Advance creep by one stride."""
     source = s.strain - p.creep * s.level if p.creep_strain > 0.5 else 0.16 * work / PRESSURE_SPAN
     level = 0.0
     for i in range(CREEP_ELEMENTS):
@@ -120,7 +120,7 @@ def shake(p, s, acceleration):
 
 @jit
 def oscillate(p, s, acceleration):
-    """Move the swinging load and the springy sensor target on by one step."""
+    """Advance the swinging load and the sensor target on its spring by one step."""
     if p.swing > 0.0:
         omega = p.swing_omega
         turn = -omega * omega * math.sin(s.angle) - 0.03 * omega * s.angle_rate

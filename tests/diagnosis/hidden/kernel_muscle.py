@@ -10,7 +10,7 @@ from .records import SLIDERS, WAVES
 
 @jit
 def sliders(stops, stiffness, breaks, move):
-    """Drag every slider by `move` and return the sum of what they hold."""
+    """Drag every slider by `move` and return the sum of their forces."""
     total = 0.0
     for i in range(SLIDERS):
         stops[i] = min(max(stops[i] + move, -breaks[i]), breaks[i])
@@ -20,7 +20,7 @@ def sliders(stops, stiffness, breaks, move):
 
 @jit
 def remapped(p, grip):
-    """Bend the inner loops and leave the fully slipped ones where they are."""
+    """Bend the inner loops and leave the fully slipped ones unchanged."""
     share = grip / p.friction
     if p.map_kind > 0.5:
         return p.friction * math.tanh(p.map * share) / math.tanh(p.map)
@@ -29,7 +29,7 @@ def remapped(p, grip):
 
 @jit
 def virgin(p, s):
-    """Return what is left of the first-cycle state, 1 at first."""
+    """Return the remaining first-cycle state, 1 at first."""
     if p.virgin_kind > 0.5:
         return math.exp(-math.sqrt(s.travel / p.virgin_scale))
     return 1.0 / (1.0 + s.travel / p.virgin_scale) ** 1.5
@@ -53,7 +53,7 @@ def grip_factor(p, s, pressure):
 
 @jit
 def effective(p, s):
-    """Return the pressure that does work after friction [bar]."""
+    """Return the effective pressure after friction [bar]."""
     pressure = s.pressure + s.line
     if p.threshold > 0.0:
         blur = p.threshold * p.threshold_blur
@@ -69,14 +69,14 @@ def effective(p, s):
 
 @jit
 def braid_gain(p, strain):
-    """Return how well pressure pulls at a strain, 1 at rest."""
+    """Return the gain of the pressure's pull at a strain, 1 at rest."""
     geometry = (p.braid * (1.0 - strain) ** 2 - 1.0) / (p.braid - 1.0)
     return (1.0 - p.blend) * geometry + p.blend * math.exp(-p.dome * (strain / p.span) ** 2)
 
 
 @jit
 def elastic(p, strain):
-    """Return the pull back of bladder and braid over the force of 1 bar at rest."""
+    """Return the elastic force of bladder and braid over the force of 1 bar at rest."""
     ratio = strain / p.span
     stretch = 1.0 - strain
     rubber = p.rubber * (1.0 - math.exp(-p.bend * ratio))
@@ -147,15 +147,15 @@ def hanging_strain(p, load):
 
 
 @jit
-def hang(p, s, told):
-    """Hang the load that is told to be `told` [N], and what else comes with it.
+def hang(p, s, declared):
+    """Hang a declared load [N] with its errors.
 
-    Scales show all loads wrong by a factor. A tray stands on a soft rest, and the heavier the
-    load, the more of the tray hangs too.
+    Scales show all loads wrong by a factor. A tray rests on a soft support, and a heavier load
+    lifts more of it.
     """
-    load = told
+    load = declared
     if p.tray > 0.0:
-        load += p.tray * (1.0 - math.exp(-told / p.tray_rest) + p.tray_scale * told / 30.0)
+        load += p.tray * (1.0 - math.exp(-declared / p.tray_rest) + p.tray_scale * declared / 30.0)
     if load != s.load or s.tick == 0:
         s.load = load
         s.weight = load / GRAVITY

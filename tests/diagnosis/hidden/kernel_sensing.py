@@ -8,7 +8,7 @@ from .kernel_tools import PRESSURE_SPAN, STEP, jit, uniform
 from .records import HISTORY
 
 WARM_UP = 5.0
-"""Seconds from switching on until the electronics read what they will."""
+"""Time in which the electronics warm up [s]."""
 
 
 @jit
@@ -26,7 +26,7 @@ def position_mm(p, s):
 
 @jit
 def listen(p, s):
-    """Let the slow position sensor follow by one step."""
+    """Advance the slow position sensor by one step."""
     value = position_mm(p, s)
     s.integral += STEP * value
     s.history[s.tick % HISTORY] = s.integral
@@ -38,8 +38,8 @@ def listen(p, s):
 
 
 @jit
-def heard(p, s):
-    """Return what the slow position sensor says [mm]."""
+def delayed_mm(p, s):
+    """Return the reading of the slow position sensor [mm]."""
     if p.late_kind < 0.5:
         return s.late[int(p.late_lags) - 1]
     window = 2.0 * p.late / STEP
@@ -61,7 +61,7 @@ def bow(p, share):
 
 @jit
 def drifted(p, t):
-    """Return how much of a sensor's drift is there."""
+    """Return the share of a sensor's drift that has occurred."""
     if p.drift_kind > 0.5:
         return t / (t + p.drift_time)
     early = 1.0 / (1.0 + math.exp(4.0))
@@ -70,7 +70,7 @@ def drifted(p, t):
 
 @jit
 def dropped(p, t):
-    """Say whether the position sensor is holding its last value."""
+    """Return whether the position sensor holds its last value."""
     cell = math.floor(t / p.dropout_cell)
     since = t - p.dropout_cell * (cell + 0.5 * uniform(p.dropout_seed, cell))
     return 0.0 <= since < p.dropout * (0.4 + 1.2 * uniform(p.dropout_seed + 3.0, cell))
@@ -80,7 +80,7 @@ def dropped(p, t):
 def read(p, s):
     """Return the readings of the position sensor [mm] and of the pressure sensor [bar]."""
     t = STEP * s.tick
-    place = heard(p, s) if p.late > 0.0 else position_mm(p, s)
+    place = delayed_mm(p, s) if p.late > 0.0 else position_mm(p, s)
     pressure = s.pressure + s.line
     if p.target > 0.0:
         place += 1e3 * p.target * (s.target + p.target_lever * s.foot)

@@ -18,6 +18,6 @@ jit = njit(cache=True, error_model="numpy")
 
 @jit
 def uniform(seed, cell):
-    """Return a number in [0, 1) that belongs to a cell of time."""
+    """Return a number in [0, 1) for a cell of time."""
     mixed = math.sin(12.9898 * (seed + 1.0) + 78.233 * (cell + 1.0)) * 43758.5453
     return mixed - math.floor(mixed)

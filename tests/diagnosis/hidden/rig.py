@@ -57,7 +57,7 @@ def simulate(base: Base, effects: Hidden, campaign: Campaign) -> dict[str, np.nd
         "time": campaign.time,
         "segment": campaign.segment,
         "command_bar": campaign.command_bar,
-        "load_told_N": campaign.load_N,
+        "declared_load_N": campaign.load_N,
         "temperature_C": campaign.temperature_C,
         "contraction_mm": rows[:, 0].copy(),
         "pressure_bar": rows[:, 1].copy(),
@@ -102,7 +102,7 @@ def make_recording(
         "pressure_command_bar": truth["command_bar"],
         "pressure_bar": pressure,
         "contraction_mm": contraction,
-        "load_N": truth["load_told_N"],
+        "load_N": truth["declared_load_N"],
         "temperature_C": truth["temperature_C"],
     }
 

@@ -1,7 +1,7 @@
 """Resonance of line or mount: decaying oscillations after steps.
 
 The air column of a long feed line oscillates against the muscle's volume, or the target of the
-position sensor stands on a soft bracket. A share of the pressure, or of the position, then follows
+position sensor is on a soft bracket. A share of the pressure, or of the position, then follows
 through a lightly damped second-order system of a few hertz.
 """
 
