@@ -16,7 +16,8 @@ from pam_envs.diagnosis.audit.tables import audit_table
 from pam_envs.diagnosis.audit.units import wrong_units
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.fit.tolerance import LOAD, unknown_names, unused_tolerances
+from pam_envs.diagnosis.fit.single_muscle import BASE
+from pam_envs.diagnosis.fit.tolerance import LOAD, unknown_names
 
 BAR = 1e5
 LOAD_STEP = 0.5  # largest difference of loads of one level [N]
@@ -205,7 +206,8 @@ def _not_used(recording: Recording, rig: Rig) -> list[str]:
     """Return warnings on declarations that the replay does not use."""
     warnings = [
         f"tolerance of {name} is not used: no refit moves it"
-        for name in unused_tolerances(rig.tolerance)
+        for name in rig.tolerance
+        if name not in (*BASE, LOAD)
     ]
     if recording.supply is not None:
         warnings.append(

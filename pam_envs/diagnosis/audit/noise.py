@@ -271,8 +271,7 @@ def _expected(covariance: Array, lags: Indices) -> Array:
 def white_noise(recording: Recording, values: Array) -> float:
     """Return the RMS of the white part of a channel, from second differences.
 
-    Only the third of the recording with the smallest change of the command is used, in windows of
-    one second.
+    Only the third of the recording with the smallest change of the command is used.
     """
     size = max(25, round(1.0 / recording.period))
     n = len(values) // size * size

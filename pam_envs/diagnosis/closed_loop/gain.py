@@ -17,7 +17,6 @@ from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.closed_loop.plant_inverse import PREVIEW, Controller, Rig, Simulated
 from pam_envs.diagnosis.closed_loop.plant_inverse import design as default_design
-from pam_envs.diagnosis.closed_loop.references import DURATION, fixed_references
 from pam_envs.plants.core.stepper import PERIOD, PlantStepper
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
@@ -34,6 +33,9 @@ LEVEL = 0.95
 LEAST_STROKE = 1e-3
 LEAST_GAP = 0.05  # relative gap to the oracle below which the recovered share is not reported
 MM = 1e3
+DURATION = 24.0  # duration of each reference [s]
+LOW, HIGH = 0.15, 0.85  # range of the references over the stroke
+SEED = 20_030_113
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,38 @@ class ReplayedRig:
         return reading + float(self._extra[self._count % len(self._extra)]), pressure
 
 
-# --- runs and scores ----------------------------------------------------------------------------
+def smooth_path(t: Array, times: Array, levels: Array, ramps: Array) -> Array:
+    """Return a smooth path that reaches each level within a ramp that starts at its time."""
+    path = np.full(len(t), levels[0])
+    for i in range(1, len(levels)):
+        s = np.clip((t - times[i]) / ramps[i], 0.0, 1.0)
+        path += (levels[i] - levels[i - 1]) * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    return path
+
+
+def fixed_references(top: float, period: float = PERIOD) -> dict[str, Array]:
+    """Return the references [m]: sines, a staircase with holds, random ramps and holds.
+
+    Fixed shapes, scaled to the stroke [m]. The steepest ramp covers it in about 0.75 s, so that a
+    regulator of usual slew rate can follow it and a slow one cannot.
+    """
+    t = np.arange(round(DURATION / period) + PREVIEW) * period
+    turns = np.array([0.08, 0.21, 0.47, 0.83])
+    sizes, phases = np.array([0.4, 0.3, 0.2, 0.1]), np.array([0.0, 1.1, 2.9, 4.6])
+    sines = (sizes * np.sin(2.0 * np.pi * turns * t[:, None] + phases)).sum(axis=1)
+    stairs = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 0.75, 0.5, 0.25, 0.0, 0.5])
+    times = np.concatenate([[0.0], 0.2 + 2.2 * np.arange(10)])
+    rng = np.random.default_rng(SEED)
+    count = round(DURATION / 1.5) + 1
+    levels, paces = rng.uniform(0.0, 1.0, count), rng.uniform(1.0, 1.8, count)
+    ramps = np.maximum(0.3, paces * np.abs(np.diff(levels, prepend=levels[0])))
+    shares = {
+        "sines": 0.5 + 0.5 * sines,
+        "staircase": smooth_path(t, times, stairs, np.full(11, 0.5)),
+        "ramps": smooth_path(t, 1.5 * np.arange(count), levels, ramps),
+    }
+    rise = smooth_path(t, np.zeros(2), np.array([0.0, 1.0]), np.full(2, 1.5))
+    return {k: top * rise * (LOW + (HIGH - LOW) * v) for k, v in shares.items()}
 
 
 def reach(rig: Rig, full: float, period: float) -> float:
@@ -194,8 +227,7 @@ NOISY = "the extended plant with its sensor noise"
 def scores(squares: Array, names: list[str], seed: int) -> dict[str, Any]:
     """Return errors and improvement with confidence intervals from a segment bootstrap.
 
-    ``squares`` are mean squares [m2] of before, after and the oracle: (2 or 3, references,
-    segments).
+    ``squares`` [m2] are of before, after and the oracle, shape (2 or 3, references, segments).
     """
     flat = squares.reshape(len(squares), -1)
     rng = np.random.default_rng(seed)

@@ -1,11 +1,10 @@
 """Controller from a plant: feedforward by inverse simulation and a PI feedback loop.
 
-Feedforward: a copy of the plant runs in open loop. In every control period a fan of setpoint ramps
-from the last setpoint is simulated on further copies; the ramp that meets the reference at the
-horizon is selected, and its first setpoint is applied. All effects of the plant are compensated,
-with history and dead time: creep, threshold, friction, droop, leak, dead band, asymmetry,
-temperature. If the reference would later be out of reach of the steepest ramp (a slow valve), that
-ramp starts at once. The feedforward uses no measurement.
+Feedforward: a copy of the plant runs in open loop, without measurements. In every control period a
+fan of setpoint ramps from the last setpoint is simulated on further copies; the ramp that meets the
+reference at the horizon is selected, and its first setpoint is applied, so that all effects of the
+plant are compensated, with history and dead time. If the reference would later be out of reach of
+the steepest ramp (a slow valve), that ramp starts at once.
 
 Feedback: a PI controller acts on the difference between the reading and the simulated reading, so
 that known delays and lags cause no feedback. Its gains are the best of a grid on the same plant,

@@ -84,8 +84,7 @@ def choose(recording: Recording, blocks: Blocks) -> Choice:
     """Choose the held-out data of a recording.
 
     Whole kinds of experiment with much but not most of the record, so that a model is judged on
-    another kind of motion than it was fitted to. With fewer than three kinds the interleaved
-    blocks are held out.
+    another kind of motion; the interleaved blocks with fewer than three kinds.
     """
     kinds = [kind_of(label) for label in recording.segments]
     names = sorted(set(kinds))

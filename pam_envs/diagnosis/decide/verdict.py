@@ -138,8 +138,7 @@ class Ladder:
     def without_one_cause(self, model: Candidate, known: Models) -> Models | None:
         """Return smaller models if one started from a larger model beats the known one.
 
-        A fit in a local optimum may need a second cause to leave it, and keep the better optimum
-        without that cause.
+        A fit may need a second cause to leave a local optimum, and keep the better one without it.
         """
         made = without_each_cause(self.problem, self.blocks, self.base, model).values()
         best = max(made, key=self.gain)

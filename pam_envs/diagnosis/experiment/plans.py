@@ -134,11 +134,6 @@ def swing(middle: float, size: float, hertz: float, seconds: float) -> Piece:
     return Piece(seconds, middle - size, middle + size, hertz)
 
 
-def closed(level: float, seconds: float) -> Piece:
-    """Return a hold with the valve closed."""
-    return Piece(seconds, level, level, shut=True)
-
-
 REST = hold(0.0, 3.0)
 TRIANGLE = (Piece(10.0, 0.0, 0.95), Piece(10.0, 0.95, 0.0))
 CYCLE = (Piece(1.5, 0.0, 0.9), Piece(1.5, 0.9, 0.0))
@@ -183,9 +178,11 @@ def _plans(means: Means) -> Iterator[Plan]:
         yield Plan(name, words, (REST, *pieces), usual, means.full)
     slow = Plan("slow", "", (REST, *TRIANGLE * 2), usual, means.full)
     if means.shut:
-        pieces = (REST, hold(0.4, 3.0), closed(0.4, 30.0), hold(0.8, 3.0), closed(0.8, 30.0))
+        pieces = [REST]
+        for level in (0.4, 0.8):
+            pieces += [hold(level, 3.0), Piece(30.0, level, level, shut=True)]
         words = "close the valve for 30 s at two pressures"
-        yield Plan("valve_shut", words, pieces, usual, means.full)
+        yield Plan("valve_shut", words, tuple(pieces), usual, means.full)
     if means.warm:
         pieces = (REST, *(hold(v, 4.0) for v in STAIRS))
         words = f"stairs while the muscle is warmed by {WARMER:g} K"

@@ -46,10 +46,10 @@ class Blocks:
         counts = self.counts[:, use].sum(axis=1)
         return errors[:, use].sum(axis=1) / np.maximum(counts, 1)
 
-    def gain(self, before: Array, after: Array, selected: Flags | None = None) -> float:
+    def gain(self, before: Array, after: Array) -> float:
         """Return the sum over channels of ``ln(MSE_before / MSE_after)``."""
         some = self.counts.sum(axis=1) > 0
-        a, b = self.means(before, selected)[some], self.means(after, selected)[some]
+        a, b = self.means(before)[some], self.means(after)[some]
         return float(np.sum(np.log(np.maximum(a, 1e-12) / np.maximum(b, 1e-12))))
 
     def draws(self, number: int, seed: int) -> Indices:

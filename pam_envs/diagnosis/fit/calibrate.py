@@ -33,8 +33,7 @@ def calibrate(
     The regulator is fitted first, to the pressure alone; then the static map and the friction by a
     regression of the force balance; then all parameters by simulation. If that fit is far from the
     readings, a second one starts from the given plant, and the better of the two is kept.
-    ``measured`` (channels, T) is NaN where there is no reading, ``noise`` (channels,) its standard
-    deviation.
+    ``measured`` (channels, T) is NaN where there is no reading, ``noise`` is its RMS (channels,).
     """
     problem = Problem(family.simulate, measured, noise, blocks.train, time, family.tie)
     frees, column = family.base(), family.column

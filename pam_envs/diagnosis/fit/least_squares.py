@@ -169,20 +169,14 @@ def column_of(fit: Fit, z: Array) -> Array:
     return column
 
 
-def prior_cost(fit: Fit, z: Array) -> float:
-    """Return the contribution of the weak priors to the cost."""
-    return float(
-        sum(
-            ((v - f.inner(f.start)) / f.prior) ** 2
-            for f, v in zip(fit.frees, z, strict=True)
-            if np.isfinite(f.prior)
-        )
-    )
-
-
 def _cost(problem: Problem, fit: Fit, z: Array, residual: Array) -> float:
     seen = residual[: problem.seen]
-    return float(np.einsum("i,i", seen, seen)) + prior_cost(fit, z)
+    priors = sum(
+        ((v - f.inner(f.start)) / f.prior) ** 2
+        for f, v in zip(fit.frees, z, strict=True)
+        if np.isfinite(f.prior)
+    )
+    return float(np.einsum("i,i", seen, seen)) + float(priors)
 
 
 def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:

@@ -60,23 +60,18 @@ def step_starts(
 step_starts.trials = 100  # type: ignore[attr-defined]
 
 
-def ramp_starts(
-    problem: Problem, family: PlantFamily, base: Fit, form: Any, output: int = 0
-) -> Starts:
-    """Return sizes [m], [Pa], middles [s] and durations [s] of slow drifts about the best step."""
-    found = step_starts(problem, family, base, form, output)[:1]
-    return [(size, middle, slow) for size, middle in found for slow in SLOW]
+def ramps(output: int) -> Callable[..., Starts]:
+    """Return a search for slow drifts of an output about the best step.
 
+    Its result are sizes [m], [Pa], middles [s] and durations [s].
+    """
 
-ramp_starts.trials = 200  # type: ignore[attr-defined]
+    def starts(problem: Problem, family: PlantFamily, base: Fit, form: Any) -> Starts:
+        found = step_starts(problem, family, base, form, output)[:1]
+        return [(size, middle, slow) for size, middle in found for slow in SLOW]
 
-
-def pressure_ramp_starts(problem: Problem, family: PlantFamily, base: Fit, form: Any) -> Starts:
-    """Return the starting values of slow drifts of the pressure reading."""
-    return ramp_starts(problem, family, base, form, output=1)
-
-
-pressure_ramp_starts.trials = 200  # type: ignore[attr-defined]
+    starts.trials = 200  # type: ignore[attr-defined]
+    return starts
 
 
 def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:

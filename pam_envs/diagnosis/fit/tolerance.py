@@ -15,7 +15,6 @@ from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, complete_jacobian, refit, restarted
 from pam_envs.diagnosis.fit.intervals import spans
 from pam_envs.diagnosis.fit.least_squares import PlantFamily, Problem
-from pam_envs.diagnosis.fit.single_muscle import BASE
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.wording import near
 
@@ -33,11 +32,6 @@ def unknown_names(tolerance: Iterable[str]) -> list[str]:
         for name in tolerance
         if name not in R.NAMES
     ]
-
-
-def unused_tolerances(tolerance: Iterable[str]) -> list[str]:
-    """Return the names of parameters that no fit changes."""
-    return [name for name in tolerance if name not in (*BASE, LOAD)]
 
 
 def load_error_limit(loads: ArrayLike, tolerance: float) -> float:

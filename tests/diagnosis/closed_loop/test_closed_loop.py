@@ -7,9 +7,12 @@ import pytest
 
 from pam_envs.diagnosis.closed_loop.gain import (
     COMPENSABLE,
+    HIGH,
+    LOW,
     ReplayedRig,
     Residuals,
     closed_loop,
+    fixed_references,
     run,
     scores,
     segment_squares,
@@ -27,7 +30,6 @@ from pam_envs.diagnosis.closed_loop.plant_inverse import (
     feed_forward,
     stroke,
 )
-from pam_envs.diagnosis.closed_loop.references import HIGH, LOW, fixed_references
 from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.core.stepper import PlantBatch, PlantStepper
 from pam_envs.plants.single_muscle.plant import SingleMuscle

@@ -39,10 +39,7 @@ CAUSE = Cause(
         "oscillation of load and muscle slows with the load's mass; in the pressure it is the "
         "line, in the contraction alone the mount. Between steps it decays, unlike a vibration."
     ),
-    source=(
-        "The acoustics of tubes (a quarter of a wave: 340 m/s over four times the length); sizes "
-        "and frequencies are assumed."
-    ),
+    source="Acoustics of tubes (340 m/s over four lengths); sizes and frequencies are assumed.",
     sensor="an accelerometer on the mount, or a fast pressure sensor at either end of the line",
     # not compensable: at or above the bandwidth of regulator and load
 )

@@ -36,13 +36,11 @@ CAUSE = Cause(
     ),
     experiment=(
         "Hold one pressure for a minute, reached from below and from above: creep changes its sign "
-        "with the direction and restarts with every step, a leak, a drift and heat do neither, and "
-        "friction leaves a constant gap."
+        "with the direction and restarts with every step; a leak, a drift and heat do not."
     ),
     source=(
-        "A public record of a DMSP-10-250 on a pressure regulator: 20 % of the stroke within 4 s "
-        "of a step to 2.1 bar; a public jig at a fixed angle: 26 % of the force in 48 s (10 mm) "
-        "and 20 % in 19 s (20 mm), two Kelvin elements of 2 and 14 s."
+        "A public record of a DMSP-10-250: 20 % of the stroke within 4 s of a step to 2.1 bar; a "
+        "jig at a fixed angle: 26 % of the force in 48 s (10 mm), 20 % in 19 s (20 mm)."
     ),
     needs=("contraction",),
     sensor="a load cell at a blocked length, beside the pressure",

@@ -20,9 +20,8 @@ CAUSE = Cause(
         ),
     ),
     signature=(
-        "the error has the sign of the direction and depends on how far the length, not the "
-        "pressure, has moved since the reversal; it differs between loads and is present when a "
-        "load changes at constant pressure"
+        "the error has the sign of the direction and depends on the distance in length, not in "
+        "pressure, since the reversal; it is present when a load changes at constant pressure"
     ),
     neighbours=(
         "hysteresis_shape",
@@ -32,14 +31,13 @@ CAUSE = Cause(
         "viscous_loss",
     ),
     experiment=(
-        "Ramp the pressure at a blocked length, and the same ramp under a constant load: friction "
-        "that length drives vanishes in the first. Without a clamp, small triangles at low and at "
-        "high pressure under two loads."
+        "Ramp the pressure at a blocked length and under a constant load: friction that length "
+        "drives vanishes in the first. Without a clamp, small triangles at two pressures and two "
+        "loads."
     ),
     source=(
         "Public isometric pulse tests of 10 and 20 mm Festo muscles: hardly any loop at full "
-        "length, 6 to 13 N at 4 to 9 % contraction; vominh2011: Maxwell-slip elements in the "
-        "length."
+        "length, 6 to 13 N at 4 to 9 % contraction; vominh2011: Maxwell-slip elements in length."
     ),
     needs=("contraction",),
     settled="whole cycles do not separate length-driven from pressure-driven friction",

@@ -20,8 +20,8 @@ CAUSE = Cause(
         "friction that goes with pressure on the level."
     ),
     source=(
-        "A public record of a DMSP-10-250 on a pressure regulator: plays fitted to the major loop "
-        "to 0.6 % miss random holds by 2.8 %, refitted on the holds by 1.1 %."
+        "A public record of a DMSP-10-250: plays that fit the major loop to 0.6 % miss random "
+        "holds by 2.8 %, refitted on the holds by 1.1 %."
     ),
     needs=("contraction",),
     settled="whole cycles hold no minor loops",

@@ -14,13 +14,10 @@ CAUSE = Cause(
     neighbours=("load_dependent_compliance", "pressure_dependent_friction", "hysteresis_drive"),
     experiment=(
         "The same slow triangle under five loads: a changing width opens or closes the loop about "
-        "its middle line, a changing compliance moves the middle line. The second masks the first "
-        "until it is in the model."
+        "its middle line, a changing compliance moves that line, which masks the first until "
+        "modelled."
     ),
-    source=(
-        "positioning2021, Tables 3 to 5: widest loops of 3.3, 2.8 and 2.4 mm at 0, 2.55 and 4.55 "
-        "kg, 5.6 % less width a kilogram."
-    ),
+    source="positioning2021, Tables 3 to 5: loops of 3.3, 2.8, 2.4 mm at 0, 2.55, 4.55 kg.",
     needs=("contraction", "loads"),
     sensor="a load cell between muscle and load",
     compensable=True,

@@ -15,8 +15,7 @@ CAUSE = Cause(
     neighbours=("sensor_bias", "wire_slack", "valve_dead_band"),
     experiment=(
         "Slow ramps from rest, against the measured pressure and under several loads: slack "
-        "changes with the load, a dead band is absent in the measured pressure, a threshold is "
-        "constant."
+        "changes with the load, a dead band is not in the pressure, a threshold is constant."
     ),
     source=(
         "Public isometric pulse tests of 10 mm Festo muscles: about 50 kPa at full length; "

@@ -25,9 +25,8 @@ CAUSE = Cause(
         "position reading does not affect the pressure."
     ),
     source=(
-        "A public record of a DMSP-10-250 on a pressure regulator: 44 ms inflating, 96 ms "
-        "deflating; an open wrist-robot project's identified ITV regulator: 45 ms, 5 to 105 ms "
-        "over pressures."
+        "A public record of a DMSP-10-250: 44 ms inflating, 96 ms deflating; an open wrist-robot "
+        "project's identified ITV regulator: 5 to 105 ms over pressures."
     ),
     sensor="a fast pressure sensor at the valve's outlet",
     compensable=True,

@@ -23,10 +23,7 @@ CAUSE = Cause(
             (Term("regulator.exhaust_rate", (1.5, 5.0), low=0.2, high=99.0, log=True),),
         ),
     ),
-    signature=(
-        "downward steps are late or early in the pressure, upward steps fit; with one lag for "
-        "both, errors of opposite signs"
-    ),
+    signature="downward steps are late or early in the pressure, upward ones the other way or not",
     neighbours=("dead_time", "slew_limit", "supply_droop", "creep"),
     experiment=(
         "Steps of several sizes up and down between the same levels, against the measured "
@@ -34,9 +31,9 @@ CAUSE = Cause(
         "upwards, creep not in the pressure."
     ),
     source=(
-        "A public record of a DMSP-10-250 on a pressure regulator: lags of 50 ms up and 84 ms "
-        "down, 24 % of the way left after a second; an open wrist-robot project's identified ITV "
-        "regulator, with the flow law of ISO 6358."
+        "A public record of a DMSP-10-250: lags of 50 ms up and 84 ms down, 24 % of the way left "
+        "after a second; an open wrist-robot project's ITV regulator, with the flow law of ISO "
+        "6358."
     ),
     needs=("exhaust",),
     sensor="a fast pressure sensor at the muscle",

@@ -21,9 +21,9 @@ CAUSE = Cause(
     signature="a triangle after each large step: the time to 63 % grows with the size of the step",
     neighbours=("dead_time", "supply_droop", "exhaust_asymmetry"),
     experiment=(
-        "Steps of three sizes, up and down: a limited rate delays by the size of the step and is "
-        "the same every time, a drooping supply is slower near the top and after heavy use, a slow "
-        "exhaust acts only downwards."
+        "Steps of three sizes, up and down: a limited rate delays in proportion to the step, every "
+        "time; a drooping supply is slower near the top and after heavy use, an exhaust only "
+        "downwards."
     ),
     source="A public record of a DMSP-10-250: 6.8 bar/s in a raw step; ISO 6358 for the flow.",
     sensor="a fast pressure sensor at the muscle",

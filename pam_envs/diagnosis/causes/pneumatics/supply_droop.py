@@ -31,8 +31,7 @@ CAUSE = Cause(
     neighbours=("slew_limit", "exhaust_asymmetry"),
     experiment=(
         "Fill to the top again and again, then once after a rest: a droop grows with the number of "
-        "fillings and vanishes after the rest, a limited rate is the same every time and at every "
-        "level."
+        "fillings and vanishes after the rest, a limited rate is the same every time."
     ),
     source="A public record of a DMSP-10-250: peaks fall from 5.65 to 5.11 bar in four cycles.",
     sensor="a pressure sensor before the valve",

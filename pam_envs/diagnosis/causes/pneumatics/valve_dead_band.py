@@ -42,9 +42,8 @@ CAUSE = Cause(
         "the contraction, dead time at any amplitude alike."
     ),
     source=(
-        "An open wrist-robot project's identified ITV regulator: overlap of the pilot stage of 16 "
-        "to 24 kPa, gain 0.15 at 4 Hz and 40 kPa; data sheets of proportional regulators: 0.1 to "
-        "0.5 % of full scale."
+        "An open wrist-robot project's identified ITV regulator: overlap of 16 to 24 kPa, gain "
+        "0.15 at 4 Hz and 40 kPa; data sheets of regulators: 0.1 to 0.5 % of full scale."
     ),
     sensor="a fast pressure sensor at the valve's outlet",
     compensable=True,

@@ -13,9 +13,8 @@ CAUSE = Cause(
     signature="the error follows the velocity by the same time at every speed; the pressure fits",
     neighbours=("dead_time", "viscous_loss"),
     experiment=(
-        "A sine at 0.2, 0.5, 1 and 2 Hz: a delay shifts all by the same time without "
-        "attenuation, a loss attenuates them and shifts the slow ones more; dead time is also in "
-        "the pressure."
+        "A sine at 0.2, 0.5, 1 and 2 Hz: a delay shifts all by one time without attenuation, a "
+        "loss attenuates them and shifts the slow ones more; dead time is also in the pressure."
     ),
     source="An open wrist-robot project: readings 15 to 25 ms behind a simulation.",
     needs=("contraction",),

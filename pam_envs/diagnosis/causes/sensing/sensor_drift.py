@@ -8,7 +8,7 @@ moments and then is constant.
 from collections.abc import Callable
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
-from pam_envs.diagnosis.fit.starting_values import Starts, pressure_ramp_starts, ramp_starts
+from pam_envs.diagnosis.fit.starting_values import Starts, ramps
 
 
 def _settling(sensor: str, size: float, time: float) -> Form:
@@ -27,9 +27,9 @@ CAUSE = Cause(
     title="a drifting sensor",
     forms=(
         _settling("position", 1e-6, 60.0),
-        _ramp("ramp", "position", 1e-4, ramp_starts),
+        _ramp("ramp", "position", 1e-4, ramps(0)),
         _settling("pressure", 10.0, 1000.0),
-        _ramp("pressure ramp", "pressure", 1e3, pressure_ramp_starts),
+        _ramp("pressure ramp", "pressure", 1e3, ramps(1)),
     ),
     signature="a slow function of time, equal at rest and under pressure, on one output only",
     contains=("sensor_bias", "slip_step"),
