@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.causes import catalogue
@@ -84,7 +85,9 @@ class ReplayedRig:
         return reading + float(self._extra[self._count % len(self._extra)]), pressure
 
 
-def smooth_path(t: Array, times: Array, levels: Array, ramps: Array) -> Array:
+def smooth_path(
+    t: NDArray[Any], times: NDArray[Any], levels: NDArray[Any], ramps: NDArray[Any]
+) -> Array:
     """Return a smooth path that reaches each level within a ramp that starts at its time."""
     path = np.full(len(t), levels[0])
     for i in range(1, len(levels)):
