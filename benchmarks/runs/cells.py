@@ -129,6 +129,8 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
         "track": track.name,
         "scenario": first.scenario.name,
         "training_seed": first.training_seed,
+        "plant_digest": env.unwrapped.plant.digest(),
+        "model_digest": model.digest(),
         **knowledge.of_plant(entrant, controller, model, env),
     }
     if entrant.files:

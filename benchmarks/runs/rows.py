@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.identity import artefacts, tasks, trainings
 from benchmarks.identity.audit import Audit
 from benchmarks.runs import knowledge, provenance
-from benchmarks.runs.cells import PUBLIC
+from benchmarks.runs.cells import PUBLIC, cells_of
 from benchmarks.runs.controllers import Entrant
 from benchmarks.runs.store import read_record, write_record
 from benchmarks.scenarios import scenario as scenarios
@@ -62,6 +62,7 @@ def assemble(
     """Return the row of a controller from the records of :func:`cells.cells_of` in its order."""
     task = tasks.of(track)
     identity = task.identity
+    _check_cells(entrant, track, cells, found)
     trainings.check_cells(entrant, cells)
     public = [cell for cell in cells if cell["split"] == PUBLIC]
     return {
@@ -96,6 +97,24 @@ def assemble(
             },
         },
     }
+
+
+def _check_cells(
+    entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None
+) -> None:
+    """Raise unless the records are those of the row's cells, of the present plants and models."""
+    needed = [(c.split, c.training_seed, c.scenario.name) for c in cells_of(entrant, track, found)]
+    if [(c["split"], c["training_seed"], c["scenario"]) for c in cells] != needed:
+        raise ValueError(f"{entrant.name}: the cells are not those of {track.name}")
+    identity = tasks.of(track).identity
+    for cell in cells:
+        name = cell["scenario"]
+        present = (track.env, identity.plants[name], identity.models[name])
+        if (cell["env"], cell["plant_digest"], cell["model_digest"]) != present:
+            raise ValueError(
+                f"{entrant.name}: a cell of {name} is of another environment, plant or model; run "
+                "it again with --force"
+            )
 
 
 def _controller(

@@ -13,12 +13,14 @@ import bench_fakes
 import gymnasium as gym
 import pytest
 
+from benchmarks.board import accessors
 from benchmarks.identity import artefacts, tasks
-from benchmarks.runs import rows
+from benchmarks.runs import cells, rows
 from benchmarks.runs.cells import cells_of
 from benchmarks.runs.controllers import BY_RULE, available, find
 from benchmarks.runs.store import write_record
 from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scoring import statistics
 from tests.benchmarks.row_helpers import place, run_row, tiny
 
 HEX = re.compile(r"[0-9a-f]{64}")
@@ -75,6 +77,15 @@ def test_every_training_seed_is_run_in_every_episode(trained: dict[str, Any], bo
         for run in (0, 1)
     ]
     assert not set(of_runs[0]) & set(of_runs[1])
+
+
+def test_interval_includes_the_scatter_of_training_seeds(trained: dict[str, Any]) -> None:
+    seen = accessors.interval(trained, "rms_error")
+    values = rows.scores_of(rows.episodes_of(trained), "rms_error")
+    strata = [episode["scenario"] for episode in rows.episodes_of(trained)]
+    blind = statistics.of_table(values[None], strata)
+    assert seen.value == pytest.approx(blind.value) == pytest.approx(values.mean())
+    assert (seen.low, seen.high) != (blind.low, blind.high)
 
 
 @pytest.mark.parametrize(
@@ -206,6 +217,19 @@ def test_row_of_an_unknown_track_is_refused(
     monkeypatch.setattr(scenarios, "FOLDER", tmp_path)
     with pytest.raises(ValueError, match="this checkout has no track 'tiny'"):
         rows.load(rows.path_of("tiny--integral", tmp_path))
+
+
+def test_cells_of_another_version_or_plant_are_not_assembled(board: Path) -> None:
+    entrant, track = find("low"), tiny(board)
+    groups = cells.grouped(cells_of(entrant, track))
+    records = [record for group in groups for record in cells.compute(group).values()]
+    assert not any(e["failed"] for e in rows.assemble(entrant, track, records)["episodes"])
+    for others in (records[:1], records[::-1]):
+        with pytest.raises(ValueError, match="the cells are not those of tiny"):
+            rows.assemble(entrant, track, others)
+    for name in ("env", "plant_digest", "model_digest"):
+        with pytest.raises(ValueError, match="is of another environment, plant or model"):
+            rows.assemble(entrant, track, [records[0], {**records[1], name: "0"}])
 
 
 def test_environments_of_a_track_are_built_once(
