@@ -214,10 +214,12 @@ def void(row: Positional[tuple[str, ...]] = (), all: bool = False) -> int:
     return 1 if count else 0
 
 
-def _row_paths(names: tuple[str, ...], all: bool = False) -> list[Path]:
+def _row_paths(names: tuple[str, ...], all: bool | None = None) -> list[Path]:
+    """Return the files of rows; ``all`` is None for a command without that option."""
     paths = [_row_path(name) for name in names] + (rows.files() if all else [])
     if not paths:
-        raise ValueError("name a row, for example positioning_nominal--inverse, or give --all")
+        other = "" if all is None else ", or give --all"
+        raise ValueError(f"name a row, for example positioning_nominal--inverse{other}")
     return paths
 
 
