@@ -32,8 +32,10 @@ class Declaration:
         SI unit, ``"1"`` for a pure number.
     low, high : float
         Bounds within which the parameter is physical, in ``unit``.
-    provenance, source : str
-        Origin of the default; the paper and place, or the reason for an assumption.
+    provenance : {"published", "derived", "assumed", "identified"}
+        Origin of the default.
+    source : str
+        The paper and place, or the reason for an assumption.
     neutral : float or None
         The value that switches the effect off, where there is one.
     spread : tuple of float or None
@@ -55,11 +57,13 @@ def parameter(
     low: float,
     high: float,
     source: str,
+    *,
     provenance: Provenance = "assumed",
-    **options: Any,
+    neutral: float | None = None,
+    spread: tuple[float, float] | None = None,
 ) -> Any:
     """Return a dataclass field for a physical parameter (see :class:`Declaration`)."""
-    declaration = Declaration(unit, low, high, provenance, source, **options)
+    declaration = Declaration(unit, low, high, provenance, source, neutral, spread)
     return dataclasses.field(default=default, metadata={"declaration": declaration})
 
 

@@ -246,7 +246,8 @@ def environment_arguments(
 
         @functools.wraps(make)
         def made(*given: Any, **arguments: Any) -> Setup:
-            for name in set(arguments) - {*known, *(p.name for p in fixed)}:
+            unknown = {*arguments} - {*known, *(p.name for p in fixed)}
+            for name in sorted(unknown):
                 close = difflib.get_close_matches(name, known, n=1)
                 hint = f", but {close[0]!r}" if close else ""
                 raise TypeError(

@@ -103,7 +103,13 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, Info]:
-        """Apply an action for one control period; a bad one is refused and changes nothing."""
+        """Apply an action for one control period; see Gymnasium.
+
+        Raises
+        ------
+        ValueError
+            If the action is not finite or has the wrong shape; nothing has changed then.
+        """
         if self._steps < 0:
             raise gym.error.ResetNeeded("call reset() before step()")
         self._take(action)
@@ -186,7 +192,13 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         }
 
     def set_state(self, state: dict[str, NDArray[Any]]) -> None:
-        """Restore a state of :meth:`get_state`; one of other arguments is a ``ValueError``."""
+        """Restore a state of :meth:`get_state`, to the last bit.
+
+        Raises
+        ------
+        ValueError
+            If the state is of another kind of environment; nothing has changed then.
+        """
         parts = check_state(state, self.setup.state(1, 1))
         try:
             steps = int(state["steps"])

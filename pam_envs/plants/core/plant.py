@@ -144,7 +144,7 @@ class Plant:
             raise UnstableParameters(
                 f"{motion} moves too fast for {self.substeps} sub-steps: phase {phase:.1f} against "
                 f"at most {LARGEST_PHASE:g}; use at least {enough} sub-steps or a larger "
-                "inertia"
+                "mass or inertia"
             )
 
     def replace(self, values: Mapping[str, Any]) -> Self:

@@ -9,6 +9,7 @@ constant for each row, its name in capitals: ``PRESSURE`` of the state ``"pressu
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -87,6 +88,9 @@ def layout(
         **({"model": NUMBERS} if tables is None else tables),
     )
     counts = row_blocks(**dict.fromkeys(COUNTS, 1), stack_count=operators)
+    used = Counter([*counts._fields, *fixed._fields, *rows._fields])
+    if twice := [name for name, number in used.items() if number > 1 and name != "end"]:
+        raise ValueError(f"two rows are named {', '.join(twice)}: rename one of them")
     found: dict[str, Any] = {}
     for block in (counts, fixed, rows):
         found |= {name.upper(): row for name, row in block._asdict().items()}
