@@ -55,6 +55,8 @@ def test_file_holds_the_whole_plant(key: tuple[str, str], tmp_path: Path) -> Non
     plant.to_yaml(tmp_path / "plant.yaml")
     again = type(plant).from_yaml(tmp_path / "plant.yaml")
     assert again == plant and again.digest() == plant.digest()
+    if key[1] == "muscle" and key[0] != "none":
+        assert again.provenance == plant.provenance != {}
     assert len(again.ensemble) == len(plant.ensemble)
     assert list(tmp_path.iterdir()) == [tmp_path / "plant.yaml"]  # no temporary file left
 
@@ -75,6 +77,9 @@ def test_parameter_rows_follow_their_names(key: tuple[str, str]) -> None:
         assert row == rows.place(name) and column[row] == plant.value(name)
     end = len(column) if key[1].startswith("arm") else rows.N_PARAMETERS
     assert len(column) == end
+    if key[1] in MAKES:  # the kernels find bundle a in the first rows, bundle b after it
+        muscles = column[rows.BUNDLE.muscles :: len(rows.BUNDLE)][:2]
+        assert muscles.tolist() == [4.0, 7.0]
     quiet = plant.without_noise()
     shown = [n for n in plant.names if n.endswith((".noise", ".resolution"))]
     assert len(shown) >= 4 and max(map(plant.value, shown)) > 0.0
@@ -87,17 +92,23 @@ def drawn(low: float, high: float, *shape: int, seed: int = 0) -> Any:
     return np.repeat(numbers, 10, axis=0)[: shape[0]]
 
 
-def knee(plants: Any, batch: tuple[int, ...], **options: Any) -> dict[str, Any]:
-    return simulate_knee(plants, drawn(3e4, 4.3e5, 60, *batch), pressure=1e5, phase=0.4, **options)
+Lanes = int | slice
+"""Which of three different commands: one of a single plant, several of a batch."""
 
 
-def joint(plants: Any, batch: tuple[int, ...], **options: Any) -> dict[str, Any]:
-    commands, shoves = drawn(-0.5, 0.5, 60, *batch), drawn(-4.0, 4.0, 60, *batch, seed=2)
-    return simulate_joint(plants, commands, disturbance=shoves, payload=0.3, **options)
+def knee(plants: Any, lanes: Lanes, **options: Any) -> dict[str, Any]:
+    commands = drawn(3e4, 4.3e5, 60, 3)[:, lanes]
+    return simulate_knee(plants, commands, pressure=1e5, phase=0.4, **options)
 
 
-def elbow(plants: Any, batch: tuple[int, ...], pulsed: bool = False, **options: Any) -> Any:
-    command = drawn(*((-0.03, 0.05) if pulsed else (5e4, 5.5e5)), 60, *batch, 2)
+def joint(plants: Any, lanes: Lanes, **options: Any) -> dict[str, Any]:
+    commands, shoves = drawn(-0.5, 0.5, 60, 3), drawn(-4.0, 4.0, 60, 3, seed=2)
+    given = {"disturbance": shoves[:, lanes], "payload": 0.3, **options}
+    return simulate_joint(plants, commands[:, lanes], **given)
+
+
+def elbow(plants: Any, lanes: Lanes, pulsed: bool = False, **options: Any) -> Any:
+    command = drawn(*((-0.03, 0.05) if pulsed else (5e4, 5.5e5)), 60, 3, 2)[:, lanes]
     t = np.pi * 0.01 * np.arange(1, 61)
     intent = (1.0 - 0.6 * np.cos(t), 0.6 * np.pi * np.sin(t), 0.6 * np.pi**2 * np.cos(t))
     return simulate_elbow(
@@ -110,9 +121,10 @@ RUNS: dict[str, Callable[..., dict[str, Any]]] = {
     "proportional": elbow, "on_off": partial(elbow, pulsed=True),
 }  # fmt: skip
 VARIED = {
-    knee: ("lever.damping", (1.1, 1.5, 2.0)),
-    joint: ("link.mass", (0.2, 0.3, 0.5)),
-    elbow: ("bundle_b.muscles", (5.0, 7.0, 9.0)),
+    "walk": ("stride.time", (1.3, 2.0, 5.0)),
+    **dict.fromkeys(("rig, measured", "no load"), ("lever.damping", (1.1, 1.5, 2.0))),
+    **dict.fromkeys(("paper", "reduced"), ("link.mass", (0.2, 0.3, 0.5))),
+    **dict.fromkeys(MAKES, ("bundle_b.muscles", (5.0, 7.0, 9.0))),
 }
 
 
@@ -121,7 +133,7 @@ VARIED = {
 @pytest.mark.parametrize("kind", kinds())
 def test_machine_code_gives_the_bits_of_plain_python(kind: str, name: str) -> None:
     plant = PLANTS[kind, name]
-    compiled, plain = (RUNS[name](plant, (), compiled=c) for c in (True, False))
+    compiled, plain = (RUNS[name](plant, 0, compiled=c) for c in (True, False))
     for signal, values in plain.items():
         assert np.array_equal(values, compiled[signal]), signal
 
@@ -139,15 +151,20 @@ def test_machine_code_gives_the_bits_of_plain_python_for_the_arm(kind: str) -> N
 
 @pytest.mark.parametrize("name", RUNS)
 def test_rows_of_a_batch_equal_the_single_plants(name: str) -> None:
-    run = RUNS[name]
-    key, values = VARIED[run.func if isinstance(run, partial) else run]
+    run, (key, values) = RUNS[name], VARIED[name]
     plants = [PLANTS["maxwell_slip", name].replace({key: value}) for value in values]
-    batch = run(plants, (1,))
+    batch = run(plants, slice(3))
     for k, plant in enumerate(plants):
-        alone = run(plant, ())
+        alone = run(plant, k)
         assert all(np.array_equal(alone[signal], batch[signal][:, k]) for signal in alone)
-    with pytest.raises(ValueError, match="one make"):
-        run([plants[0], PLANTS["none", name]], (1,))
+
+
+@pytest.mark.parametrize("pair", [("paper", "reduced"), ("proportional", "on_off"), ("walk",)])
+def test_plants_of_several_makes_are_refused(pair: tuple[str, ...]) -> None:
+    plants = [PLANTS["maxwell_slip", name] for name in pair] + [PLANTS["none", pair[0]]]
+    for other in plants[1:]:
+        with pytest.raises(ValueError, match="one make"):
+            RUNS[pair[0]]([plants[0], other], slice(2))
 
 
 RAMP = np.linspace(0.0, 1.0, 20)
