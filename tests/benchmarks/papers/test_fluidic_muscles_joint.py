@@ -80,6 +80,8 @@ def test_exact_figures_of_the_pi() -> None:
     assert exact.overshoot == pytest.approx(4.32, abs=0.005)
     assert exact.rise == pytest.approx(0.1321, abs=5e-5)
     assert exact.settling == pytest.approx(0.3666, abs=5e-5)
+    names = ("overshoot", "settling to 2 %", "phase margin")
+    assert all(figures()[f"PI: {name}"].passed for name in names)
     read = figures()["PI: rise on the coarse samples"]
     assert read.passed is None
     assert read.ours == pytest.approx(0.1274, abs=5e-5)

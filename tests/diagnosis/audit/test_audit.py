@@ -241,10 +241,24 @@ def scaled(**factors: float) -> dict:
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        (scaled(pressure=100.0), "it looks like kPa: divide by 100"),
-        (scaled(pressure=14.5), "it looks like psi: divide by 14.504"),
-        (scaled(pressure=0.1), "it looks like MPa: multiply by 10"),
-        (scaled(pressure=1e-3), "no muscle runs at this pressure"),
+        (
+            scaled(pressure=100.0),
+            "pressure_bar goes up to 551.3; it looks like kPa: divide by 100",
+        ),
+        (
+            scaled(pressure=14.5),
+            "pressure_bar goes up to 79.94; it looks like psi: divide by 14.504",
+        ),
+        (
+            scaled(pressure=0.1),
+            "pressure_bar never exceeds 0.551 while the command goes to 5.5 bar; it looks like "
+            "MPa: multiply by 10",
+        ),
+        (
+            scaled(pressure=1e-3),
+            "pressure_bar never exceeds 0.00551 while the command goes to 5.5 bar; no muscle runs "
+            "at this pressure",
+        ),
         (
             scaled(command=100.0, pressure=100.0),
             "pressure_command_bar goes up to 550; it looks like kPa: divide by 100",
@@ -377,12 +391,16 @@ def test_missing_columns_make_causes_undecidable():
     reasons = undecidable(made(temperature=None, load=25.0, pressure=None, valve_closed=()), RIG)
     assert reasons["payload_error"] == "the load was 25 N throughout"
     assert "the valve was never shut" in reasons["leak"]
+    assert reasons["temperature"] == "the temperature was not recorded"
     assert set(reasons) == {
-        c.name for c in catalogue() if {"temperature", "loads", "valve_closed"} & set(c.needs)
+        *("temperature", "payload_error", "load_dependent_hysteresis"),
+        *("load_dependent_compliance", "wire_slack", "leak"),
     }
     reasons = undecidable(made(contraction=None))
     assert set(reasons) == {c.name for c in catalogue() if "contraction" in c.needs}
     assert set(reasons.values()) == {"the contraction was not recorded"}
+    assert {"creep", "slip_step", "sensor_delay", "stick_slip", "wire_slack"} <= set(reasons)
+    assert not {"valve_dead_band", "dead_time"} & set(reasons)
 
 
 def test_payload_error_needs_declared_tolerance():
