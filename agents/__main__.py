@@ -184,7 +184,7 @@ def enter(
     /,
     author: str = "",
 ) -> None:
-    """Copy finished runs to agents/pretrained, from where the leaderboard takes them.
+    """Copy finished runs to agents/pretrained, the folder that the leaderboard reads.
 
     The runs are training seeds 0 to n - 1 of one preset, and replace its older files.
 
@@ -216,8 +216,8 @@ def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
 def evaluations(policies: Annotated[tuple[Path, ...], tyro.conf.Positional], /) -> None:
     """Print the evaluations on tuning seeds during training, and which policy was exported.
 
-    The number "value" chooses the policy; "kinds" are the RMS errors of the kinds of rows,
-    relative to the first evaluation's, which is the controller's if the policy corrects one.
+    "value" is the selection criterion. "kinds" lists the RMS error of each kind of rows, relative
+    to the first evaluation (of the controller alone, for a residual policy).
     """
     from agents.policies.policy import OnnxPolicy
 
@@ -247,7 +247,7 @@ def tune(
     storage: Path | None = None,
     write: bool = False,
 ) -> None:
-    """Search hyper-parameters on tuning seeds; the same command continues a killed search.
+    """Search hyper-parameters on tuning seeds; the same command resumes a killed search.
 
     Each trial is two trainings of --steps control periods.
 
@@ -279,8 +279,9 @@ def tune(
 def classical(env: Env, /, algo: Algo = "ppo", variant: Variant = "residual") -> None:
     """Evaluate the classical controllers of an environment on tuning seeds, the best first.
 
-    This chooses the controller that a residual corrects; the leaderboard never does. The preset
-    gives plants, references and, as evaluation.objective, the first number.
+    Use the result to choose the controller that a residual policy corrects; the leaderboard does
+    not use it. The preset defines plants, references and the first number
+    (evaluation.objective).
     """
     from agents.training.evaluation import evaluate, value_of
     from baselines.core.catalogue import CONTROLLERS

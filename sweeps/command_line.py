@@ -20,9 +20,11 @@ def run_cli(command: Callable[[], int | None], interrupted: str) -> int:
     try:
         status = command()
         sys.stdout.flush()
-    except ValueError as error:  # of settings, rows, checkpoints and policy files, with the remedy
+    except (
+        ValueError
+    ) as error:  # raised for settings, rows, checkpoints and policy files, with the remedy
         return _fail(f"error: {error}", 2)
-    except BrokenPipeError:  # the reader of the output, like `head`, has ended
+    except BrokenPipeError:  # the process reading the output, such as `head`, has exited
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     except OSError as error:

@@ -1,7 +1,7 @@
 """Tasks on a running Dask cluster.
 
-This uses Dask's own client: its joblib backend waits for ever for a task without a result, whose
-worker died too often or cannot import its code (joblib 1.6).
+This uses Dask's own client. Its joblib backend waits forever for a task whose worker died too often
+or cannot import the task's code (joblib 1.6).
 """
 
 from __future__ import annotations
@@ -29,12 +29,13 @@ def run(act: Act, tasks: Mapping[str, Task], address: str) -> Iterator[Done]:
     """Execute tasks on the workers of the scheduler at ``address``.
 
     Dask assigns the tasks of a lost worker to others, and abandons a task after several workers
-    died with it. Of several abandoned tasks one may be the cause: each is tried again, alone.
+    died while executing it. Each of several abandoned tasks is repeated alone, since only one of
+    them may be the cause.
 
     Raises
     ------
     ValueError
-        If no scheduler answers, or it goes away.
+        If no scheduler answers, or the connection to it is lost.
     """
     with _client(address) as client:
         workers = _Workers(client, address)
@@ -62,7 +63,7 @@ def _client(address: str) -> Client:
 
 
 class _Workers:
-    """Reports once that the cluster has no worker, since Dask waits for one in silence."""
+    """Report once that the cluster has no worker, since Dask waits without a message."""
 
     def __init__(self, client: Client, address: str) -> None:
         self.client, self.address, self.reported = client, address, False
@@ -85,8 +86,8 @@ def _round(
 ) -> Iterator[Done]:
     """Yield the outcomes of tasks in order of completion.
 
-    Each task is awaited to its value: a worker that dies after the task's end takes the value with
-    it, and the task is executed again. ``as_completed`` loses a task that then fails, and one whose
+    Each task is awaited until its value arrives: if a worker dies after the task's end, the value
+    is lost and the task is repeated. ``as_completed`` loses a task that then fails, and one whose
     value is in transit when the scheduler ends (distributed 2026.8).
     """
     found: SimpleQueue[Done | None] = SimpleQueue()

@@ -1,9 +1,9 @@
 """Execution of many independent tasks that survives the loss of any worker.
 
-A task is anything that pickles and has a ``key``, the digest of all that its result depends on.
-Workers return results, and the caller alone stores them, so a killed worker leaves no partial file
-and a cluster needs no common disk. Stored results are the checkpoint: the caller asks again for
-the missing tasks, and gets the same bits.
+A task is any object that pickles and has a ``key``, the digest of all inputs of its result.
+Workers return results and only the caller stores them, so a killed worker leaves no partial file
+and a cluster needs no common disk. Stored results are the checkpoint: a resumed run executes only
+the missing tasks, with bit-identical results.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class Cluster:
 def run(act: Act, tasks: Iterable[Task], cluster: Cluster) -> Iterator[Done]:
     """Execute all tasks and yield their outcomes in order of completion.
 
-    An exception in ``act`` is the task's error. A task whose worker dies is executed again, and
-    is an error if its worker dies every time.
+    An exception in ``act`` is the task's error. A task whose worker dies is repeated, and becomes
+    an error if its worker dies every time.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Tasks on processes of this machine, with joblib's loky backend.
 
-When a process dies (killed, out of memory, a crash), joblib ends its whole pool. The tasks that it
-had handed out are then executed again, each alone, which identifies a task that kills its process
-every time. The others continue together.
+When a process dies (killed, out of memory, a crash), joblib ends its whole pool. The tasks in
+execution at that moment are then repeated, each alone, which identifies a task that kills its
+process every time. The remaining tasks continue in parallel.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _round(act: Act, tasks: Mapping[str, Task], jobs: int, started: list[str]) -
 
     driver = {"initializer": end_with, "initargs": (os.getpid(),)}
     with parallel_config("loky", inner_max_num_threads=1, **driver):
-        # one task at a time for each process, so that few are in doubt when one dies
+        # one task at a time per process, so that few are repeated when one dies
         parallel = Parallel(jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs)
         try:
             yield from parallel(handed_out())

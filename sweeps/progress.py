@@ -1,4 +1,4 @@
-"""Progress of long work: a bar on a terminal, a line a minute elsewhere."""
+"""Progress of long tasks: a bar on a terminal, otherwise one line per minute."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ LINE_SECONDS = 60.0
 
 
 class Advance(Protocol):
-    """Counts what was done, and shows a note beside it."""
+    """Count completed tasks and show a note beside the count."""
 
     def __call__(self, count: int = 1, note: str = "") -> None:
-        """Count ``count`` more."""
+        """Add ``count`` completed tasks."""
         ...
 
 

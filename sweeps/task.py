@@ -12,7 +12,7 @@ class Task(Protocol):
 
     @property
     def key(self) -> str:
-        """Digest of all that the result depends on."""
+        """Digest of all inputs of the result."""
         ...
 
 

@@ -18,8 +18,8 @@ _one_at_a_time = threading.Lock()
 def do(act: Act, task: Task, key: str) -> Done:
     """Execute a task; an exception becomes the error of the result.
 
-    A worker with other sources or packages than the caller, or another type of processor where the
-    key depends on it, computes another key for the task and refuses it.
+    A worker whose sources or packages differ from the caller's, or whose type of processor differs
+    if the key depends on it, computes a different key for the task and refuses it.
     """
     try:
         if task.key != key:
@@ -34,9 +34,9 @@ def do(act: Act, task: Task, key: str) -> Done:
 
 
 def do_in_cluster(act: Act, task: Task, key: str) -> Done:
-    """Execute as :func:`do`, one task at a time in a process with any number of threads.
+    """Execute like :func:`do`, but one task at a time in a process with any number of threads.
 
-    Compiled kernels, random numbers and caches of a process are for one thread.
+    Compiled kernels, random numbers and caches of a process are not thread-safe.
     """
     with _one_at_a_time:
         if is_needed():
@@ -45,13 +45,13 @@ def do_in_cluster(act: Act, task: Task, key: str) -> Done:
                 return done
     from distributed import Reschedule
 
-    raise Reschedule  # should the result be needed after all, Dask assigns the task again
+    raise Reschedule  # if the result is needed after all, Dask assigns the task again
 
 
 def is_needed() -> bool:
     """Return whether the result of this thread's task is still needed.
 
-    A Dask worker continues a task whose caller is gone. Long tasks ask here and end.
+    A Dask worker continues a task after its caller has ended. Long tasks call this and stop.
     """
     distributed = sys.modules.get("distributed")
     if distributed is None:
@@ -65,7 +65,7 @@ def is_needed() -> bool:
 
 
 def end_with(driver: int) -> None:
-    """End this process when its driver is gone; loky calls this when it starts a process."""
+    """End this process when its driver has ended; loky calls this when it starts a process."""
     threading.Thread(target=_watch, args=(driver,), daemon=True).start()
 
 

@@ -67,8 +67,8 @@ def export_policy(
     Raises
     ------
     ValueError
-        If the model has layers without a counterpart here, or corrects a controller that is mostly
-        at a limit.
+        If the model has layers that the export does not support, or corrects a controller that is
+        mostly saturated.
     """
     full = {**facts(model), **(card or {})}
     write_policy(Path(path), policy_bytes(model, full), {"training": dict(training or {})})
@@ -101,7 +101,7 @@ def policy_bytes(model: Any, card: Mapping[str, Any]) -> bytes:
 
 
 def _layer(env: Any, kind: type[L]) -> L | None:
-    """Return the wrapper of a kind around the environment, if there is one."""
+    """Return the wrapper of the given class around the environment, or None."""
     while hasattr(env, "venv"):
         if isinstance(env, kind):
             return env
@@ -137,7 +137,7 @@ def facts(model: BaseAlgorithm) -> dict[str, Any]:
 
 
 def plants_of(env: Any) -> list[str]:
-    """Return the digests of the rows' nominal plants, each once."""
+    """Return the distinct digests of the rows' nominal plants."""
     return list(dict.fromkeys(plant.digest() for _, plant in _kinds(env)))
 
 

@@ -1,4 +1,4 @@
-"""Recorded answers of the controller that a residual policy corrects, from tuning episodes."""
+"""Recorded actions, in tuning episodes, of the controller that a residual policy corrects."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from baselines.core.recorded_answers import Array, RecordedAnswers
 
 STEPS = 48
 EPISODES = 8
-"""Tuning episodes among which the one with the most travel is recorded."""
+"""Number of tuning episodes; the one with the largest travel is recorded."""
 MOST_AT_LIMIT = 0.1
-"""Largest share of answers at a limit of the action, where a changed controller may not differ."""
+"""Largest share of saturated actions, which can hide a change of the controller."""
 
 
 def record(
     env: str, kinds: Sequence[Mapping[str, Any]], controller: Any, name: str
 ) -> RecordedAnswers:
-    """Return a controller's answers in the tuning episode in which it moves most.
+    """Return a controller's actions in the tuning episode with the largest travel.
 
     Parameters
     ----------
@@ -38,20 +38,20 @@ def record(
     Raises
     ------
     SettingsError
-        If the controller is at a limit of the action too often in every episode.
+        If the controller saturates too often in every episode.
     """
     found = [episode for kind in kinds for episode in _episodes(env, kind, controller)]
     if not found:
         raise SettingsError(
-            f"residual.controller = {name!r} is at a limit in more than {MOST_AT_LIMIT:.0%} of its "
-            "answers in every tuning episode, which leaves little to correct; choose another "
+            f"residual.controller = {name!r} is saturated in more than {MOST_AT_LIMIT:.0%} of the "
+            "periods of every tuning episode, which leaves little to correct; choose another "
             "controller, or references that it can follow"
         )
     return max(found, key=lambda episode: episode.travel)
 
 
 def _episodes(env: str, kind: Mapping[str, Any], controller: Any) -> list[RecordedAnswers]:
-    """Return the first periods of tuning episodes in which the controller is seldom at a limit."""
+    """Return the first periods of the tuning episodes in which the controller seldom saturates."""
     arguments = {**kind, "info": False}
     made: Any = gym.make_vec(env, EPISODES, vectorization_mode="vector_entry_point", **arguments)
     space = made.single_action_space

@@ -113,7 +113,7 @@ KINDS: dict[str, Kind] = {
     "sac": Kind("sac", "SAC, two layers; no memory", SAC),
     "tqc": Kind("tqc", "TQC, two layers; no memory", TQC),
 }
-"""By algorithm and variant, as in a file name; residuals and a user's presets are apart."""
+"""By algorithm and variant, as in a file name; residuals and a user's presets are separate."""
 NAME = re.compile(r"[a-z0-9_]+")
 """Valid names of controllers."""
 HOW_TO_NAME = "name its file ENV.ALGO-VARIANT.yaml, the variant in small letters, digits and _"
@@ -135,8 +135,8 @@ WHERE: dict[str, str] = {
 def offered() -> dict[str, Entry]:
     """Return an entry for every preset.
 
-    A SettingsError names a preset of another environment or algorithm than its file name, or whose
-    controller's name is not valid or not unique.
+    A SettingsError names a preset whose environment or algorithm differs from its file name, or
+    whose controller's name is not valid or not unique.
     """
     made: dict[str, Entry] = {}
     for (env_id, algo, variant), path in configs.presets().items():
@@ -149,8 +149,8 @@ def offered() -> dict[str, Entry]:
         name = _prefix(preset) + _suffix(env_id.removeprefix("PAM/"))
         if name in made or not NAME.fullmatch(name):
             raise SettingsError(
-                f"the preset {path.stem} would be the controller {name!r}, "
-                f"{'as another is' if name in made else 'which is no name'}; {HOW_TO_NAME}"
+                f"the preset {path.stem} would get the controller name {name!r}, which is "
+                f"{'already in use' if name in made else 'not a valid name'}; {HOW_TO_NAME}"
             )
         made[name] = _entry(path, preset, config)
     return made
@@ -284,8 +284,8 @@ def load_pretrained(
     ):
         if is_ != should:
             raise PolicyFileError(
-                f"{policy.name} is by its card of {what} {is_!r}, and should be of {should!r}; "
-                "name files as they were trained"
+                f"the card of {policy.name} has {what} {is_!r}, its file name {should!r}; "
+                "name the file after the training"
             )
     return policy
 

@@ -21,7 +21,7 @@ from agents.settings.schema import SettingsError
 
 
 class Finished(NamedTuple):
-    """A run that may be entered: its folder, preset (``KneeWalk-v0.ppo``) and training seed."""
+    """A run that can be entered: its folder, preset (``KneeWalk-v0.ppo``) and training seed."""
 
     folder: Path
     preset: str
@@ -91,13 +91,13 @@ def _checked(folder: Path) -> Finished:
 
 
 def _preset(folder: Path, config: configs.Config, words: list[str]) -> str:
-    """Return the name of the preset with a run's settings; ``words`` are of its command."""
+    """Return the name of the preset with a run's settings; ``words`` is its training command."""
     env = config.env.removeprefix("PAM/")
     if "--config" in words:
         raise SettingsError(
-            f"{folder} was trained with settings of no preset; save them as agents/configs/"
-            f"{env}.{config.algo}-VARIANT.yaml, VARIANT in small letters, digits and _, and train "
-            "by --variant"
+            f"{folder} was trained with --config, not with a preset; save the settings as "
+            f"agents/configs/{env}.{config.algo}-VARIANT.yaml, VARIANT in small letters, digits "
+            "and _, and train with --variant"
         )
     variant = words[words.index("--variant") + 1] if "--variant" in words[:-1] else ""
     kind = f"{config.algo}-{variant}" if variant else config.algo
@@ -106,15 +106,15 @@ def _preset(folder: Path, config: configs.Config, words: list[str]) -> str:
     if path is None:
         kinds = sorted(stem.rpartition(".")[2] for stem in known if stem.startswith(f"{env}."))
         raise SettingsError(
-            f"{folder} is of the preset {env}.{kind}, and {env} has {', '.join(kinds)}; add "
-            f"agents/configs/{env}.{kind}.yaml, or train one of those"
+            f"{folder} was trained with the preset {env}.{kind}, which does not exist; add "
+            f"agents/configs/{env}.{kind}.yaml, or train one of {', '.join(kinds)}"
         )
     preset, own = configs.read(path).decisive().as_dict(), config.decisive().as_dict()
     other = [name for name in sorted({*preset, *own}) if preset.get(name) != own.get(name)]
     if other:
         raise SettingsError(
-            f"{folder} was trained with {', '.join(other)} other than {path.name} has now; train "
-            "it anew, or give the preset these settings"
+            f"{folder} was trained with other values of {', '.join(other)} than {path.name} has "
+            "now; train it anew, or give the preset these settings"
         )
     return path.stem
 

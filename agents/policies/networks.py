@@ -88,7 +88,7 @@ class LinearFeatures(BaseFeaturesExtractor):
 
 
 class LayersAndInputs(nn.Module):
-    """Layers of policy and critic; the policy's output is joined by the inputs themselves.
+    """Hidden layers of policy and critic; the inputs are appended to the output of the policy's.
 
     ``recurrent`` is the width of a recurrent layer's output before the inputs, 0 for none;
     ``critic`` the width of what the critic reads.
@@ -132,7 +132,7 @@ def _layers(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.S
 
 
 class _LinearPath(ActorCriticPolicy):
-    """Part of both structured policies: ``hold`` inputs pass through the linear path at first.
+    """Common part of the structured policies: the linear path, initialised to ``hold``.
 
     ``hold`` gives, for each action, the input that the untrained policy returns; empty for none.
     """
@@ -165,7 +165,7 @@ class StructuredPolicy(_LinearPath):
 
 
 class RecurrentStructuredPolicy(_LinearPath, RecurrentActorCriticPolicy):
-    """Recurrent actor-critic whose inputs also pass beside the recurrent layer."""
+    """Recurrent actor-critic with a skip connection around the recurrent layer."""
 
     @staticmethod
     def _process_sequence(
@@ -186,12 +186,12 @@ def _zero(last: Any) -> Any:
 
 
 def silence(policy: Any) -> None:
-    """Set the untrained policy's action to 0, so that a residual begins as its controller."""
+    """Set the untrained policy's action to 0, so that a residual starts as its controller."""
     _zero(policy.action_net if isinstance(policy, ActorCriticPolicy) else policy.actor.mu)
 
 
 def critic_alone(policy: Any, alone: bool) -> None:
-    """Freeze all of an actor-critic but the critic, or nothing."""
+    """Freeze all parameters except the critic's if ``alone``, otherwise none."""
     for name, parameter in policy.named_parameters():
         parameter.requires_grad_(not alone or name.startswith(CRITIC))
 
@@ -199,7 +199,7 @@ def critic_alone(policy: Any, alone: bool) -> None:
 def policy_arguments(config: Config, signals: Signals, actions: Signals) -> dict[str, Any]:
     """Return ``policy`` and ``policy_kwargs`` for stable-baselines3.
 
-    A SettingsError names what is no signal, or a held signal of another range than the action.
+    A SettingsError names an unknown signal, or a held signal whose range is not the action's.
     """
     network = config.network
     names = input_names(config, signals, actions)

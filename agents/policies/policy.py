@@ -1,6 +1,6 @@
-"""A trained policy as a controller: an ONNX file, run by onnxruntime on one thread.
+"""Trained policy as a controller: an ONNX file, run by onnxruntime on one thread.
 
-It needs neither torch nor stable-baselines3, and loading a file cannot run code.
+Inference needs neither torch nor stable-baselines3, and loading a file cannot run code.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class OnnxPolicy:
         episode_start: Any = None,
         controller: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], Any]:
-        """Return the action, given that of the controller that the policy corrects.
+        """Return the corrected action, given the action of the controller.
 
         The other parameters are those of :meth:`predict`.
         """
@@ -165,7 +165,7 @@ class OnnxPolicy:
         return (action if made.ndim == 2 else action[0]), state
 
     def _state_inputs(self, state: Any, episode_start: Any, rows: int) -> dict[str, NDArray[Any]]:
-        """Return the inputs for the state and the beginnings of episodes."""
+        """Return the graph's inputs for the state and the episode starts."""
         starts = np.zeros((rows, 1), np.float32)
         if state is None:
             starts[:] = 1.0
@@ -201,8 +201,8 @@ class OnnxPolicy:
             shapes = {node.name: (node.type, node.shape[1:]) for node in found}
             if shapes != {name: ("tensor(float)", [width]) for name, width in expected.items()}:
                 raise PolicyFileError(
-                    f"{self.name} has {shapes}, but by its card it should have float32 numbers a "
-                    f"row as follows: {expected}; export it with agents.export.export.export_policy"
+                    f"{self.name} has {shapes}, but its card requires float32 numbers per row as "
+                    f"follows: {expected}; export it with agents.export.export.export_policy"
                 )
         return memory
 
@@ -251,7 +251,7 @@ def _compare(mine: Signals, theirs: Signals, what: str) -> None:
     a, b = list(mine.names()), list(theirs.names())
     if a != b:
         raise PolicyFileError(
-            f"{what}: it was trained with {', '.join(a)}, but there is {', '.join(b)}; make the "
+            f"{what}: trained with {', '.join(a)}, now {', '.join(b)}; make the "
             "environment with the arguments on the policy's card (env_kwargs)"
         )
     for trained, given in zip(mine, theirs, strict=True):
@@ -259,5 +259,6 @@ def _compare(mine: Signals, theirs: Signals, what: str) -> None:
             if not _equal(getattr(trained, field), getattr(given, field)):
                 raise PolicyFileError(
                     f"{what}: {trained.name} had {field} = {getattr(trained, field)!r} in "
-                    f"training, now {getattr(given, field)!r}; make the environment alike"
+                    f"training, now {getattr(given, field)!r}; make the environment with the "
+                    "arguments on the policy's card (env_kwargs)"
                 )

@@ -40,11 +40,11 @@ OPERATORS = frozenset(
         *("Transpose", "Unsqueeze"),
     )
 )
-"""Operators of policies: none loops, and none makes a tensor from a size."""
+"""Permitted operators: no loops, and none that creates a tensor from a size."""
 
 
 class PolicyFileError(ValueError):
-    """A file that is no policy, or a refused one; the message contains the remedy."""
+    """An invalid or refused policy file; the message contains the remedy."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ def read(path: str | Path) -> PolicyFile:
 def write_policy(path: Path, data: bytes, record: Mapping[str, Any]) -> None:
     """Write a policy ``*.onnx`` and, before it, its training record ``*.json`` with its SHA-256.
 
-    A process that is killed at any moment leaves no policy that :func:`finished` accepts without
-    its record.
+    The order ensures that :func:`finished` never accepts a policy without its record, even if the
+    process is killed.
     """
     said = {**record, "sha256": hashlib.sha256(data).hexdigest()}
     text = json.dumps(said, indent=1, sort_keys=True) + "\n"
@@ -99,7 +99,7 @@ def record_of(path: Path) -> dict[str, Any]:
 
 
 def finished(path: str | Path) -> dict[str, Any] | None:
-    """Return the card of a policy, None unless both its files are there and agree."""
+    """Return the card of a policy, None unless both its files exist and agree."""
     path = Path(path)
     try:
         file = read(path)
@@ -183,7 +183,7 @@ def _check_sizes(model: onnx.ModelProto) -> None:
             if dims is None or len(dims) - len(sizes) > 1 or math.prod(sizes) > MOST_NUMBERS:
                 raise PolicyFileError(
                     f"the size of {name!r} (operator {node.op_type}) is not known in advance or "
-                    f"above {MOST_NUMBERS:,} numbers a row; export a plain feed-forward network"
+                    f"above {MOST_NUMBERS:,} numbers per row; export a plain feed-forward network"
                 )
 
 

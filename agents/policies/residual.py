@@ -1,4 +1,4 @@
-"""A policy and the controller that it corrects, as one controller."""
+"""Residual policy and the controller that it corrects, combined into one controller."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from baselines.core.catalogue import make_controller
 from baselines.core.recorded_answers import RecordedAnswers
 
 TOLERANCE = 1e-3
-"""Allowed deviation of a controller's answers, as a share of what the policy can add."""
+"""Tolerance of the controller's actions, as a share of the policy's largest correction."""
 
 
 class ResidualState(NamedTuple):
@@ -61,10 +61,10 @@ class ResidualPolicy:
 
 
 def with_controller(policy: OnnxPolicy, plant: Any) -> OnnxPolicy | ResidualPolicy:
-    """Return a policy together with the controller that it corrects, if any.
+    """Return a policy combined with the controller that it corrects, if any.
 
-    The controller is built from the nominal plant. A PolicyFileError says that the controller,
-    built from a plant of the training, does not give its recorded answers.
+    The controller is built from the nominal plant. A PolicyFileError reports a controller that,
+    built from a plant of the training, does not reproduce its recorded actions.
     """
     if not policy.corrects:
         return policy
@@ -75,14 +75,15 @@ def with_controller(policy: OnnxPolicy, plant: Any) -> OnnxPolicy | ResidualPoli
         if deviation > tolerance:
             raise PolicyFileError(
                 f"{policy.name} was trained on the controller {policy.corrects!r}, which now "
-                f"answers otherwise: by {deviation:.2g} of at most {tolerance:.2g}; train the "
-                "policy anew, or go back to the version of baselines that it was trained with"
+                f"deviates from its recorded actions by {deviation:.2g}, more than "
+                f"{tolerance:.2g}; train the policy anew, or use the version of baselines of its "
+                "training"
             )
     return ResidualPolicy(policy, controller)
 
 
 def _recorded(policy: OnnxPolicy) -> tuple[dict[str, RecordedAnswers], float]:
-    """Return the controller's recorded answers by the plant's digest, and their tolerance."""
+    """Return the controller's recorded actions by the plant's digest, and their tolerance."""
     widths = len(policy.signals), len(policy.action_signals)
     try:
         held = policy.card["baseline"]
@@ -90,6 +91,6 @@ def _recorded(policy: OnnxPolicy) -> tuple[dict[str, RecordedAnswers], float]:
         return found, TOLERANCE * float(held["scale"])
     except (KeyError, TypeError, ValueError) as error:
         raise PolicyFileError(
-            f"{policy.name}: its card has no sound record of the controller {policy.corrects!r} "
+            f"{policy.name}: its card has no valid record of the controller {policy.corrects!r} "
             f"({error}); export it with this version"
         ) from error

@@ -34,7 +34,7 @@ from agents.training.callbacks import PeriodicCallback, WarmUp, score_of
 from agents.training.evaluation import value_of
 
 HEARTBEAT = 60
-"""Seconds between heartbeats of a trial; without three of them it is repeated."""
+"""Heartbeat interval of a trial [s]; a trial is repeated after three missed heartbeats."""
 RETRIES = 2
 REPORTS = 5
 """Number of evaluations of a training before its end."""
@@ -47,7 +47,7 @@ TRAINING_SEEDS = (10_000, 10_001)
 
 @dataclass(frozen=True)
 class Job:
-    """A search.
+    """A hyper-parameter search.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """Name of the study, which identifies all that affects the meaning of a value."""
+        """Name of the study; it identifies every setting that affects a trial's value."""
         config = self.config
         kind = f"{config.algo}-{config.residual.controller}" if config.residual.controller else ""
         what = f"{config.env} {kind or config.algo} {self.steps} steps, seed {self.seed}"

@@ -51,7 +51,7 @@ class Normalize:
 class _OnPolicy:
     """Settings of PPO and recurrent PPO, with the names of stable-baselines3.
 
-    The learning rate goes from its first to its last value, linearly over the training. In the
+    The learning rate changes linearly from its first to its last value over the training. In the
     first ``warm_up`` rollouts the critic learns alone, so that an untrained critic does not spoil a
     policy that starts as a controller (silver2018); in as many rollouts after them the rate rises
     from 0.
@@ -117,7 +117,7 @@ class TQC(_OffPolicy):
 
 @dataclass(frozen=True)
 class History:
-    """Past signals among the inputs, since hysteresis hides a state that one observation lacks.
+    """Past signals as inputs: with hysteresis a single observation is not the full state.
 
     ``frames`` is the number of past control periods, 0 for none.
     """

@@ -129,7 +129,7 @@ class Config:
 
     @property
     def chosen(self) -> Any:
-        """Part of the algorithm in use."""
+        """Settings of the algorithm in use."""
         return getattr(self, self.algo)
 
     def decisive(self) -> Config:
@@ -222,7 +222,7 @@ def from_mapping(given: Any) -> Config:
 
 
 def _extended(given: Mapping[str, Any], above: tuple[str, ...] = ()) -> Any:
-    """Return a mapping merged into the preset that it extends; ``above`` are those extending it."""
+    """Return a mapping merged into the preset that it extends; ``above`` is the chain so far."""
     name = given["extends"]
     under = _mapping(_extendable(name, above))
     own = {key: value for key, value in given.items() if key != "extends"}
@@ -241,7 +241,7 @@ def _extendable(name: Any, above: tuple[str, ...]) -> Path:
         raise SettingsError(f"extends = {name!r} must name a preset, for example KneeWalk-v0.ppo")
     if name in above:
         circle = " -> ".join((*above[above.index(name) :], name))
-        raise SettingsError(f"extends = {name!r} is a circle ({circle}); take one out")
+        raise SettingsError(f"extends = {name!r} is circular ({circle}); remove one")
     path = FOLDER / f"{name}.yaml"
     if not path.is_file():
         names = [p.stem for p in presets().values()]

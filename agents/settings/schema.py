@@ -89,7 +89,7 @@ def _one_of(kinds: tuple[Any, ...], value: Any, place: str) -> Any:
                 return _value(kind, value, place)
             except SettingsError as refused:
                 error = error or refused
-    raise error or SettingsError(f"{place} = {value!r} is of no known kind")
+    raise error or SettingsError(f"{place} = {value!r} has an unknown type")
 
 
 def _several(kinds: tuple[Any, ...], value: Any, place: str) -> tuple[Any, ...]:

@@ -1,8 +1,8 @@
 """Disjoint environment seeds for training and for tuning, apart from those of benchmarks.
 
 Training uses seeds from ``TRAINING`` on; evaluations that choose settings and policies use the
-seeds from ``TUNING`` on. Scenarios use seeds below ``TUNING``, and audits draw theirs. So no scored
-episode is trained on or decides a setting.
+seeds from ``TUNING`` on. Scenarios use seeds below ``TUNING``, and each audit round draws its own.
+Scored episodes are therefore used neither in training nor in the choice of settings.
 """
 
 from __future__ import annotations

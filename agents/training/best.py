@@ -1,4 +1,4 @@
-"""The best policy among the evaluations of a training, exported instead of the last."""
+"""Selection of the best evaluated policy of a training, for export instead of the last one."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ SMALLEST = 32
 
 
 class RolloutCallback(BaseCallback):
-    """Callback that acts between rollouts alone."""
+    """Callback that acts only between rollouts."""
 
     def _on_step(self) -> bool:
         return True
@@ -35,7 +35,7 @@ class RolloutCallback(BaseCallback):
 class WarmUp(RolloutCallback):
     """Train the critic alone in the first rollouts.
 
-    The effect depends on the number of steps alone, so a resumed training repeats it.
+    It depends only on the number of steps, so a resumed training reproduces it.
     """
 
     def __init__(self, config: Config) -> None:
@@ -55,7 +55,7 @@ class WarmUp(RolloutCallback):
 
 
 class Cancellation(RolloutCallback):
-    """Stop a training of a Dask cluster whose result nobody waits for."""
+    """Stop a training on a Dask cluster after its sweep has ended."""
 
     def _on_rollout_start(self) -> None:
         if not is_needed():
@@ -127,13 +127,13 @@ class Evaluations(PeriodicCallback):
 
 
 def score_of(model: Any, config: Config) -> Score:
-    """Return the score on tuning seeds of the model as it would be exported now."""
+    """Return the score, on tuning seeds, of the policy that an export would write now."""
     card = facts(model)
     return evaluate(OnnxPolicy(policy_bytes(model, card), card), config)
 
 
 class Checkpoints(PeriodicCallback):
-    """Write checkpoints; the evaluations act before, so that one holds that of its step."""
+    """Write checkpoints, each after the evaluation of the same step, which it then includes."""
 
     def __init__(self, run: Run, clock: Clock, evaluations: Evaluations) -> None:
         super().__init__(run.config.checkpoint_steps)

@@ -1,7 +1,7 @@
 """Checkpoint files: replaced atomically, and read without executing code.
 
-A file is a mark, the SHA-256 of the rest, and tensors, numbers and text in torch's format, which
-is read with ``weights_only=True``: no other types are built.
+A file consists of a magic number, the SHA-256 of the rest, and tensors, numbers and text in torch's
+format. It is read with ``weights_only=True``, which builds no other types.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ MARK = b"PAMCKPT1"
 
 
 class CheckpointError(ValueError):
-    """A checkpoint that cannot be used; the message says why and what to do."""
+    """An unusable checkpoint; the message contains reason and remedy."""
 
 
 def sweep(folder: Path) -> None:
-    """Remove what killed writers left behind."""
+    """Remove the temporary files of killed writers."""
     for stale in folder.glob(f"*{TEMPORARY}"):
         stale.unlink(missing_ok=True)
 

@@ -23,7 +23,7 @@ from baselines.core.catalogue import make_controller
 
 TRAVEL = "effort/pressure_travel"
 MORE_TRAVEL = 1.05
-"""Ratio of a policy's travel to its controller's up to which the travel costs nothing."""
+"""Largest ratio of a policy's travel to its controller's without a penalty."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def _known(value: float) -> float | None:
 def value_of(score: Score, config: Config, travel: float | None = None) -> float:
     """Return the criterion of ``evaluation.objective``: less is better, infinite if unknown.
 
-    Each episode that a limit ended adds the whole error again (a return includes such ends), and a
+    Each episode ended by a limit adds the whole error again (a return already includes it), and a
     residual with more travel [Pa] than its controller's ``travel`` is penalised in proportion.
     """
     objective = config.evaluation.objective
@@ -80,9 +80,9 @@ def value_of(score: Score, config: Config, travel: float | None = None) -> float
 def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = None) -> Score:
     """Return the score of a policy on tuning seeds, on the plants of its training.
 
-    A text is the name of a classical controller, built from the nominal plant. The episodes, by
-    default those of ``config.evaluation``, are split evenly among the kinds of rows (at least one
-    each), which have the same seeds.
+    ``policy`` may be the name of a classical controller, built from the nominal plant. The
+    episodes, by default those of ``config.evaluation``, are split evenly among the kinds of rows
+    (at least one each), which have the same seeds.
     """
     count = config.evaluation.episodes if episodes is None else episodes
     kinds = config.kinds()

@@ -1,4 +1,4 @@
-"""Training run: its settings and folder, how to repeat it, and what it cost."""
+"""Training run: settings, folder, command that reproduces it, and cost."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Run:
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:32]
 
     def finished(self) -> bool:
-        """Return whether the folder holds the policy and its record, not of other settings."""
+        """Return whether the folder holds the policy and its record; raise for other settings."""
         card = finished(self.folder / POLICY)
         if card is None:
             return False
@@ -67,7 +67,7 @@ class Run:
         return True
 
     def command(self) -> str:
-        """Return the command that trains the same policy again.
+        """Return the command that reproduces the policy.
 
         Without a preset of these settings it takes them from ``policy.onnx``.
         """
@@ -104,7 +104,7 @@ def code() -> str:
 
 @dataclass
 class Clock:
-    """Time spent on a run, over all interruptions: that before [s] is from the checkpoint."""
+    """Time spent on a run across interruptions; ``before`` [s] comes from the checkpoint."""
 
     wall: float = 0.0
     cpu: float = 0.0
@@ -113,7 +113,7 @@ class Clock:
     )
 
     def spent(self) -> dict[str, float]:
-        """Return the time until now [s], as a checkpoint keeps it."""
+        """Return the total time until now [s], for the checkpoint."""
         wall, cpu = self._began
         return {
             "wall": self.wall + time.perf_counter() - wall,

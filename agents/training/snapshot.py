@@ -1,6 +1,6 @@
 """Snapshot of a training at the start of a rollout, from which it continues bit for bit.
 
-It holds all that the future depends on: policy, optimisers, normalisation, replay buffer,
+It holds the complete state: policy, optimisers, normalisation, replay buffer,
 environment, random generators and counters. The bits are equal for the same libraries, the same
 type of processor and one torch thread.
 """

@@ -7,7 +7,7 @@ were evaluated (:mod:`agents.training.best`), or the last without evaluations.
 Exactness: a checkpoint is taken at the start of a rollout. A run that was killed and resumed ends
 with the same bits and the same ``policy.onnx`` as an uninterrupted one, for every algorithm,
 recurrent or not, with history and controller, given the same package versions and type of
-processor. Torch uses one thread, since sums depend on the number of threads. The log alone
+processor. Torch uses one thread, since sums depend on the number of threads. Only the log
 differs: it holds the steps between the last checkpoint and the kill twice.
 """
 
@@ -36,7 +36,7 @@ from sweeps.progress import progress
 
 
 def start(run: Run) -> BaseAlgorithm:
-    """Return the model of a new run in a folder without one, if its policy can be exported."""
+    """Return the model of a new run; raise if the folder holds a run or export is impossible."""
     if run.checkpoint.exists():
         raise CheckpointError(
             f"{run.folder} already holds a training; continue it (--resume) or give another --out"
@@ -129,7 +129,7 @@ def train_to_the_end(run: Run, console: Console) -> Path:
 
 
 def _so_far(run: Run, steps: int) -> tuple[Clock, Evaluations]:
-    """Return the time spent and the evaluations made before the checkpoint."""
+    """Return the time spent and the evaluations recorded up to the checkpoint."""
     if not steps:
         return Clock(), Evaluations(run.config, [], Best())
     content = checkpoint.load(run.checkpoint)

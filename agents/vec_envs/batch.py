@@ -1,4 +1,4 @@
-"""Adapter of batched environments to stable-baselines3: one kernel call a step and batch.
+"""Adapter of batched environments to stable-baselines3: one kernel call per step and batch.
 
 There are no processes and no loop over environments. stable-baselines3 expects a list of ``info``
 dictionaries; here all rows whose episode continues share one empty dictionary.
@@ -211,7 +211,7 @@ class BatchVecEnv(VecEnv):
             )
 
     def get_state(self) -> dict[str, NDArray[Any]]:
-        """Return all that the future depends on; see the batched environment."""
+        """Return the complete state; see the batched environment."""
         states = [self._base(i).get_state() for i in range(len(self.batches))]
         return {f"{i}/{name}": v for i, state in enumerate(states) for name, v in state.items()}
 

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 
 class HistoryVecEnv(VecEnvWrapper):
-    """Append past values of some columns, the latest first; an episode begins as if at rest.
+    """Append past values of some columns, the latest first; at reset they equal the present values.
 
     The exported policy does the same inside its graph (:mod:`agents.export.graph`).
 

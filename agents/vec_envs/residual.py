@@ -1,4 +1,4 @@
-"""Environment in which the action corrects that of a controller."""
+"""Environment of a residual policy, whose action corrects a controller's."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class ResidualVecEnv(VecEnvWrapper):
                 infos[row]["terminal_observation"] = np.concatenate([observation, answer])
 
     def snapshot(self) -> dict[str, Any]:
-        """Return all that the future depends on."""
+        """Return the complete state."""
         return {
             "seen": self.seen.copy(),
             "given": self.given.copy(),

@@ -1,8 +1,9 @@
-"""Cases of the diagnosis benchmark: a drawn rig, its hidden effects and their sizes, its recording.
+"""Cases of the diagnosis benchmark: a drawn rig, hidden effects of given size, and a recording.
 
-The *size* of an effect is the RMS of its part that a refit of the plant's base to the noise-free
-clean rig does not absorb, over the noise, on the output where it is largest. A case gives a target
-size, for which the amplitude is solved. The diagnosis sees only recording and rig file.
+The *size* of an effect is the RMS, over the noise, of the part of its trace that a refit of the
+plant's base parameters does not absorb, on the output where it is largest. The refit is to the
+noise-free clean rig. A case gives a target size, for which the amplitude is solved. The diagnosis
+sees only recording and rig file.
 """
 
 from __future__ import annotations
@@ -98,11 +99,10 @@ class Truth:
 
 @dataclass(frozen=True)
 class Ground:
-    """A clean rig under a campaign, with the subspace that a refit of the plant spans.
+    """A clean rig under a campaign, and the subspace of the changes that a refit can make.
 
-    ``clean`` are its outputs without effect and noise [m], [Pa], shape (2, T). ``basis`` is
-    orthonormal and spans the changes that a refit can make; ``order`` is that of a flattened trace
-    in it.
+    ``clean`` are its outputs without effect and noise [m], [Pa], shape (2, T). ``basis`` is an
+    orthonormal basis of the subspace; ``order`` is the order of a flattened trace in it.
     """
 
     base: hidden.Base
@@ -125,7 +125,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class Made:
-    """A generated case: input of the diagnosis, and the hidden truth; RMS noise [m], [Pa]."""
+    """A generated case: input of the diagnosis, hidden ground truth, and RMS noise [m], [Pa]."""
 
     recording: Recording
     sheet: Rig
@@ -140,7 +140,7 @@ class Made:
 
 
 def loudest(rows: Array) -> float:
-    """Return the larger RMS of two rows."""
+    """Return the larger of the RMS values of two rows."""
     return float(np.sqrt((rows**2).mean(axis=1)).max())
 
 
@@ -271,7 +271,7 @@ def make(case: Case) -> Made:
 def _truths(
     ground: Ground, found: list[tuple[hidden.Effect, float, Array]], outputs: Array
 ) -> Iterator[Truth]:
-    """Yield the hidden effects; the trace of one of several is the change without it."""
+    """Yield the hidden effects; with several, the trace of one is the change when it is removed."""
     for k, (effect, amplitude, alone) in enumerate(found):
         trace = alone
         if len(found) > 1:
@@ -293,7 +293,7 @@ FULL: dict[str, int] = {
 
 
 def first_seed(selected: str, offset: int = 0) -> int:
-    """Return the first seed of a set; sets and offsets have disjoint seeds."""
+    """Return the first seed of a set; sets and offsets use disjoint seeds."""
     if not 0 <= offset < 100:
         raise ValueError(f"seed offset {offset} is outside [0, 99]; choose another")
     return 10_000_000 * (SETS[selected] + 1) + 100_000 * offset

@@ -28,7 +28,7 @@ WITHOUT_CAUSE = {
     **dict.fromkeys(("clean", "decoy", "brief"), "adequate"),
     **{"idle": "insufficient", "unknown": "unexplained"},
 }
-"""Correct verdict on rigs that hide nothing of the catalogue, by kind."""
+"""Correct verdict on rigs without a hidden cause of the catalogue, by kind."""
 GAP = 0.15
 WORSE = 1.05
 LEVEL = 0.95
@@ -38,7 +38,7 @@ Numbers = dict[str, Any]
 
 @dataclass(frozen=True)
 class Answer:
-    """A record in the categories of the statistics."""
+    """The verdict of a record in the categories of the statistics."""
 
     kind: str
     truth: tuple[str, ...]
@@ -74,7 +74,7 @@ class Answer:
 
     @property
     def first(self) -> str:
-        """The first claimed cause, or the verdict without one."""
+        """The first claimed cause, or the verdict if there is none."""
         return self.names[0] if self.claims else self.verdict
 
     @property
@@ -169,7 +169,7 @@ SHARES: dict[str, tuple[str, Callable[[Answer], bool]]] = {
     "pair_wrong": ("pair", lambda one: one.wrong),
     "pair_first": ("pair", lambda one: one.right_first),
 }
-"""Shares of the page: kinds of cases, and what is counted."""
+"""Shares of the page: kinds of cases, and the counted property."""
 
 
 def exact_interval(count: int, n: int, level: float = LEVEL) -> list[float]:
@@ -219,7 +219,7 @@ def shares(by_kind: Mapping[str, list[Answer]]) -> Numbers:
 
 
 def firsts(answers: Iterable[Answer]) -> dict[str, int]:
-    """Return how often each first cause, or verdict without one, is given."""
+    """Return the counts of first causes, or of verdicts without a cause."""
     return dict(Counter(one.first for one in answers).most_common())
 
 
@@ -259,7 +259,7 @@ def confusion(single: Sequence[Answer]) -> Numbers:
 
 
 def confused(alone: Sequence[Answer]) -> Numbers:
-    """Return the most frequent confusions: as first cause, open rival, or extra cause."""
+    """Return the most frequent confusions, by role: first cause, open rival, or extra cause."""
     first = Counter((o.truth[0], o.first) for o in alone if o.claims and not o.right_first)
     rivals = Counter(
         (one.truth[0], "+".join(sorted(names)))
@@ -322,7 +322,7 @@ def least_right(single: Sequence[Answer]) -> Numbers:
 
 
 def recovery(alone: Sequence[Answer]) -> Numbers:
-    """Return how well the sizes of correctly named causes are recovered."""
+    """Return the accuracy of the recovered sizes of correctly named causes."""
     pairs = [(t["found"], t["true"]) for one in alone for t in one.traces.values()]
     if not pairs:
         return {"n": 0, "rank_correlation": None, "median_ratio": None}

@@ -1,9 +1,9 @@
 """Diagnosis of the orthosis' estimate of the knee torque (yeh2010, Eq. 1).
 
 Eq. 1 computes the knee torque from the vertical ground force, its centre of pressure and the lean
-of the shank. :func:`diagnose` compares it with the knee torque of a gait laboratory, refits the
-length of the shank, and compares rival terms on held-out strides, with the search and the rule of
-the muscle diagnosis.
+of the shank. :func:`diagnose` compares the estimate with the knee torque of a gait laboratory,
+refits the length of the shank, and compares rival terms on held-out strides, with the search and
+the decision rule of the muscle diagnosis.
 
 ``python -m benchmarks.diagnosis.gait_diagnosis`` prints the results at several paces.
 """
@@ -85,8 +85,8 @@ class GaitEstimate(PlainPlant):
     def regressors(self) -> Regressors:
         """Return position and motion of the leg as variables of the residual.
 
-        From the markers, whose errors are not in the estimate; the shoe's noise would explain its
-        own residual.
+        They come from the markers, whose errors are independent of the estimate; variables from the
+        shoe would explain the residual by its own noise.
         """
         r = self.recording
         k, v, a = r.knee / 0.5, r.knee_rate / 3.0, r.ankle / 0.3
@@ -169,7 +169,7 @@ class Outcome:
         return float(np.sqrt(mean) * self.problem.noise[0])
 
     def gain_of(self, name: str) -> float:
-        """Return the log mean-square gain of a cause alone on held-out strides; NaN if untried."""
+        """Return the log mean-square gain of a cause alone on held-out strides; NaN if untested."""
         first = self.ladder[1]["rivals"] if len(self.ladder) > 1 else []
         return next((r["gain"] for r in first if r["names"] == [name]), float("nan"))
 

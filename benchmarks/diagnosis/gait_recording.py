@@ -1,8 +1,8 @@
-"""Recordings of a walking leg as a gait laboratory and the orthosis make them at the same time.
+"""Simultaneous recordings of a walking leg by a gait laboratory and by the orthosis.
 
-The laboratory has a force plate and follows the leg by markers: it knows the horizontal force and,
-by inverse dynamics, what the knee bears. The orthosis has the shoe and the lean of the shank, and
-makes Eq. (1) of them. No two strides are alike: pace and centre of pressure vary.
+The laboratory has a force plate and markers on the leg: it measures the horizontal force and, by
+inverse dynamics, the knee torque. The orthosis measures shoe forces and the lean of the shank, and
+computes Eq. (1) from them. Pace and centre of pressure vary from stride to stride.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ Array = NDArray[np.float64]
 
 PERIOD = KneeOrthosis.control_period
 PACE_SPREAD = 0.06
-"""Share by which a stride's duration differs from the mean at most."""
+"""Largest relative deviation of a stride's duration from the mean."""
 AIM = (0.9, 1.15)
-"""Range of the height [m] that the braking force points at."""
+"""Range of the height [m] of the point through which the ground force acts."""
 LAB_NOISE = 1.0
-"""Of the laboratory's knee torque [N m]."""
+"""Standard deviation of the laboratory's knee torque [N m]."""
 PLATE_NOISE = 2.0
-"""Of the plate's horizontal force [N]."""
+"""Standard deviation of the plate's horizontal force [N]."""
 LOADED = 50.0
 """Least vertical force [N] of a loaded foot."""
 
@@ -35,9 +35,9 @@ LOADED = 50.0
 class GaitRecording:
     """Strides one after the other, arrays of shape (T,) in SI.
 
-    ``torque`` is the knee torque by inverse dynamics [N m], NaN while the foot is in the air;
-    ``inertial`` that which accelerates shank and foot, from the markers; ``horizontal`` the ground
-    force on the plate [N], ahead positive. The orthosis reads ``vertical`` force [N], centre of
+    ``torque`` is the knee torque by inverse dynamics [N m], NaN in swing; ``inertial`` the torque
+    that accelerates shank and foot, from the markers; ``horizontal`` the ground force on the plate
+    [N], forward positive. The orthosis reads ``vertical`` force [N], centre of
     pressure ``cop`` [m ahead of the ankle] and ``lean`` of the shank [rad]. Knee and ankle angles
     [rad] are flexion and dorsiflexion.
     """
@@ -56,11 +56,11 @@ class GaitRecording:
 
     @property
     def time(self) -> Array:
-        """Time [s], strides put together."""
+        """Time [s] of the concatenated strides."""
         return np.asarray(np.arange(len(self.torque)) * PERIOD, np.float64)
 
     def and_then(self, other: GaitRecording) -> GaitRecording:
-        """Return this recording and another one of the same leg after it."""
+        """Return this recording followed by another one of the same leg."""
         if self.leg != other.leg:
             raise ValueError("both recordings must be of one leg; record them with one plant")
         parts = {
@@ -75,7 +75,7 @@ class GaitRecording:
 def record(pace: float, strides: int, seed: int = 0, noise: float = 1.0) -> GaitRecording:
     """Return strides of level walking with a mean duration [s].
 
-    ``noise`` is the share of the sensors' noise that acts.
+    ``noise`` scales the noise of the sensors.
     """
     rng = np.random.default_rng(seed)
     times = pace * (1.0 + PACE_SPREAD * rng.uniform(-1.0, 1.0, strides))
@@ -101,7 +101,7 @@ def record(pace: float, strides: int, seed: int = 0, noise: float = 1.0) -> Gait
 
 
 def _strides(plants: list[KneeOrthosis], times: Array) -> dict[str, Array]:
-    """Return the second of three strides of each plant, one after the other, free of noise."""
+    """Return the second of three strides of each plant, concatenated, without noise."""
     steps = round(3.0 * float(times.max()) / PERIOD)
     made = simulate_knee(plants, np.full(steps, 1.5e5), pressure=1.5e5)
     turns = (np.arange(1, steps + 1) * PERIOD)[:, None] / times
@@ -122,9 +122,9 @@ def _strides(plants: list[KneeOrthosis], times: Array) -> dict[str, Array]:
 
 
 def inertial_torque(lean: Array, knee: Array, leg: Leg) -> Array:
-    """Return the knee torque [N m] that accelerates shank and foot below a hip that moves evenly.
+    """Return the knee torque [N m] that accelerates shank and foot; the hip's velocity is constant.
 
-    Lean of the shank and flexion of the knee [rad] have shape (T, n), one sample a control period.
+    Lean of the shank and flexion of the knee [rad]: shape (T, n), one sample per control period.
     """
     first, second = (_derivatives(angle) for angle in (lean, knee))
     thigh, rate, acceleration = knee - lean, second[0] - first[0], second[1] - first[1]

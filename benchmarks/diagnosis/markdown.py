@@ -7,7 +7,7 @@ from typing import Any
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]], numbers: bool = False) -> str:
-    """Return a table; with ``numbers`` all columns but the first are aligned to the right."""
+    """Return a table; with ``numbers`` all columns except the first are right-aligned."""
     rules = [":--", *["--:"] * (len(head) - 1)] if numbers else ["---"] * len(head)
     lines = [head, rules, *rows]
     for line in lines:

@@ -30,14 +30,14 @@ FRESH = ("cycles_after_rest",)
 
 
 def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:
-    """Return the recording of the campaign and the experiment after it, and the owner's sheet."""
+    """Return the recording of campaign and subsequent experiment, and the rig file."""
     means = Means.of(made.recording, made.sheet)
     plan = {p.name: p for p in plans(means)}[plan_name]
     before = made.ground.campaign
     extra = _campaign(plan, before)
     whole = _joined(before, extra)
     sheet = sheet_of(made.ground.base, whole, case.noise)
-    if plan.name in FRESH:  # time starts anew in the second recording
+    if plan.name in FRESH:  # time restarts in the second recording
         runs = [(made.effects, before), (made.effects, extra)]
     else:
         share = before.command_bar.size / whole.command_bar.size
@@ -53,7 +53,7 @@ def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:
 
 
 def _campaign(plan: Plan, before: hidden.Campaign) -> hidden.Campaign:
-    """Return a plan as what is done to a rig, its pieces labelled by whether the valve is shut."""
+    """Return a plan as a campaign, with one segment per stretch of open or closed valve."""
     shut = plan.command < 0.0
     piece = np.concatenate([[0], np.cumsum(shut[1:] != shut[:-1])])
     held = np.where(shut, 0.0, plan.command)
@@ -74,7 +74,7 @@ def _joined(first: hidden.Campaign, second: hidden.Campaign) -> hidden.Campaign:
 
 
 def _sooner(effect: hidden.Effect, share: float) -> hidden.Effect:
-    """Keep the moment of what happens at a share of the run, where the run gets longer."""
+    """Keep the absolute time of an event given as a share of the run when the run gets longer."""
     if "slip_time" not in effect.shape:
         return effect
     return replace(effect, shape={**effect.shape, "slip_time": share * effect.shape["slip_time"]})
@@ -84,7 +84,7 @@ def _sooner(effect: hidden.Effect, share: float) -> hidden.Effect:
 
 
 class DrivenRig:
-    """A hidden rig driven by a controller, see :class:`pam_envs.diagnosis.closed_loop.gain.Rig`."""
+    """A hidden rig in closed loop, see :class:`pam_envs.diagnosis.closed_loop.gain.Rig`."""
 
     period = PERIOD
 
@@ -106,11 +106,11 @@ class DrivenRig:
         return self._rig.position_mm * MM
 
     def reset(self, seed: int | None = None) -> None:
-        """Bring it to rest and start its noise anew."""
+        """Return to rest and restart the noise."""
         self._rig.reset(seed or 0)
 
     def step(self, set_point: float) -> tuple[float, float]:
-        """Hold a set-point [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+        """Hold a setpoint [Pa] for a period; return measured contraction [m] and pressure [Pa]."""
         place, pressure = self._rig.step(set_point / BAR)
         return place * MM, pressure * BAR
 
@@ -175,7 +175,7 @@ class OracleRig:
         return float(self._one.position[0])
 
     def step(self, set_point: float) -> tuple[float, float]:
-        """Hold a set-point [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+        """Hold a setpoint [Pa] for a period; return measured contraction [m] and pressure [Pa]."""
         rows = self._one.run([[set_point]])
         return float(rows[0, 0, 0]), float(rows[1, 0, 0])
 

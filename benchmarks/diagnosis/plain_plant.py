@@ -1,4 +1,4 @@
-"""Plants other than the muscle for the diagnosis, with tables of parameters and causes."""
+"""Plants other than the muscle for the diagnosis, defined by tables of parameters and causes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Parameters = Mapping[str, tuple[float, float, float, float]]
 
 
 class PlainPlant:
-    """Parameters of a plant as :class:`pam_envs.diagnosis.fit.plant_protocol.PlantFamily` has them.
+    """Parameters of a plant for :class:`pam_envs.diagnosis.fit.plant_protocol.PlantFamily`.
 
     ``base_names`` are always fitted; those of ``weighed`` are known to one meaningful change, those
     of ``logarithmic`` are fitted on a logarithmic scale.

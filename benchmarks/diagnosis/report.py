@@ -341,8 +341,7 @@ def write(
 ) -> list[Path]:
     """Write ``diagnosis.md``, ``diagnosis.json`` and ``diagnosis.png`` and return their paths.
 
-    ``arguments`` are those of the command, ``beside`` what :func:`figures` takes beside the
-    records.
+    ``arguments`` are those of the command, ``beside`` the further arguments of :func:`figures`.
     """
     made = figures(records, **beside)
     paths = [folder / f"diagnosis.{kind}" for kind in ("md", "json", "png")]

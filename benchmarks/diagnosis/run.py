@@ -1,7 +1,7 @@
 """Run of the diagnosis on drawn cases, with records on disk as checkpoints.
 
-A record belongs to a case, a stage and the numbers of rule, causes and default plant: with another
-version of the rule it is made again. A failed case has a record too and counts as wrong.
+A record belongs to a case, a stage and the numbers of rule, causes and default plant: it is
+computed again for another version of the rule. A failed case also has a record and counts as wrong.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Advance = Callable[[], None]
 
 @cache
 def engine_digest() -> str:
-    """Return the digest of what decides a diagnosis: numbers of rule, causes, default plant."""
+    """Return the digest of the numbers that determine a diagnosis: rule, causes, default plant."""
     causes = [
         (c.name, [[astuple(term) for term in form.terms] for form in c.forms]) for c in catalogue()
     ]
@@ -53,7 +53,7 @@ class Task:
 
     @property
     def key(self) -> str:
-        """Digest of all that the record depends on: the name under which it is kept."""
+        """Digest of all inputs of the record; it is the record's file name."""
         parts = [self.case.record(), self.stage, engine_digest(), provenance.packages()]
         return digest(parts)[:32]
 
@@ -62,9 +62,9 @@ class Task:
 class Options:
     """Selection of cases to run.
 
-    ``fraction`` is the part of the cases of every kind and cause, ``kinds`` and ``names`` keep only
-    these kinds and cases that hide one of these effects, ``loops`` is the number of cases of every
-    cause that are run in closed loop, ``next`` carries out the proposed experiments.
+    ``fraction`` is that of the cases of every kind and cause; ``kinds`` and ``names`` select kinds
+    and hidden effects; ``loops`` is the number of cases of every cause that are run in closed loop;
+    ``next`` carries out the proposed experiments.
     """
 
     chosen: str = "small"
@@ -105,11 +105,11 @@ class Options:
 
 @dataclass
 class Report:
-    """Outcome of a run: one record a case, with the sections of its further stages.
+    """Outcome of a run: one record per case, with the sections of its further stages.
 
-    ``computed`` and ``found`` count the stages that were made now and those that were there
-    already; ``failed`` are cases with the reason, which count as wrong, ``quarantined`` corrupt
-    records that were set aside and made again.
+    ``computed`` and ``found`` count the stages computed now and those already stored; ``failed``
+    maps failed cases, which count as wrong, to the reason; ``quarantined`` are corrupt records that
+    were set aside and computed again.
     """
 
     records: list[dict[str, Any]] = field(default_factory=list)
@@ -120,7 +120,7 @@ class Report:
 
 
 def select(options: Options) -> list[Case]:
-    """Return the cases to run, kinds and causes mixed, so that a part of a run is like the whole.
+    """Return the cases to run, kinds and causes mixed, so that a partial run is representative.
 
     A smaller fraction is contained in a larger one.
     """
@@ -141,7 +141,9 @@ def select(options: Options) -> list[Case]:
     for case in matching:
         group = _group(case)
         number = math.ceil(options.fraction * totals[group] - 1e-9)
-        if seen[group] < number:  # each group is spread evenly, at random within its share
+        if (
+            seen[group] < number
+        ):  # each group is spread evenly over the run, at random within each interval
             kept.append(((seen[group] + rng.random()) / number, case))
         seen[group] += 1
     return [case for _, case in sorted(kept, key=lambda entry: entry[0])][: options.limit]
@@ -154,7 +156,7 @@ def _known(what: str, given: Iterable[str], known: Collection[str]) -> None:
 
 
 def _group(case: Case) -> tuple[str, ...]:
-    """Return what a case is one of: its kind, and its cause where it has one."""
+    """Return the stratum of a case: its kind, and its cause if it has one."""
     return (case.kind, *(case.names if case.kind in ("single", "weak", "loud") else ()))
 
 
@@ -163,10 +165,10 @@ def run(
     start: Callable[[int], Advance] = lambda total: lambda: None,
     act: Study = study,
 ) -> Report:
-    """Make what is missing of the records and return them all.
+    """Compute the missing records and return all records.
 
-    ``start`` is called with the number of cases to make of each stage and returns what to call
-    after each; ``act`` makes a record of a case and some stages.
+    ``start`` is called with the number of missing cases of each stage and returns the function to
+    call after each case; ``act`` computes the record of a case and some stages.
     """
     store = Store(options.folder)
     store.sweep()
@@ -191,9 +193,9 @@ def run(
 
 
 def rejudged(options: Options) -> list[dict[str, Any]]:
-    """Return records that are there, of whatever sources, judged anew by the present rule.
+    """Return the stored records, of any version of the sources, judged again by the present rule.
 
-    Of several records of a case the newest; what no longer fits the names is left out.
+    The newest of several records of a case counts; records with outdated names are omitted.
     """
     newest: dict[Case, dict[str, Any]] = {}
     for path in sorted(options.folder.glob("*.json")):
@@ -210,7 +212,7 @@ def _date(record: dict[str, Any]) -> str:
 
 
 def _judged(record: dict[str, Any]) -> dict[str, Any]:
-    """Return a record with the verdict that the present rule gives on its evidence."""
+    """Return a record with the verdict of the present rule on its evidence."""
     if record["failure"] or not record["evidence"]:
         return record
     found = judge(record["evidence"], Rule())
@@ -252,7 +254,7 @@ def _stage(
     start: Callable[[int], Advance],
     act: Study,
 ) -> dict[Case, dict[str, Any]]:
-    """Return the records of a stage, by case; what is missing is made."""
+    """Return the records of a stage by case; compute the missing ones."""
     tasks = {case: Task(case, stage) for case in chosen}
     there = {} if options.force else {c: store.load(t.key) for c, t in tasks.items()}
     missing = [task for case, task in tasks.items() if there.get(case) is None]
@@ -268,7 +270,7 @@ def _stage(
 def _computed(
     missing: Sequence[Task], store: Store, cluster: engine.Cluster, act: Study
 ) -> Iterator[None]:
-    """Make records and keep each as it comes; a case whose workers die becomes a failed one."""
+    """Compute records and store each on completion; a case whose workers die is a failed case."""
     tasks = {task.key: task for task in missing}
     for done in engine.run(partial(_made, act), missing, cluster):
         task = tasks[done.key]
@@ -283,5 +285,5 @@ def _computed(
 
 
 def _made(act: Study, task: Task) -> dict[str, Any]:
-    """Make a record; called in workers."""
+    """Compute a record; called in workers."""
     return {**act(task.case, (task.stage,)), "stage": task.stage}

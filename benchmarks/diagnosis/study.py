@@ -1,4 +1,4 @@
-"""Study of one benchmark case: diagnosis, hidden truth, closed loop, next experiment."""
+"""Study of one benchmark case: diagnosis, ground truth, closed loop, next experiment."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_RIVALS = 6
 
 
 def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
-    """Generate a case, diagnose it, and return the result with the truth in plain types.
+    """Generate a case, diagnose it, and return the result with the ground truth in plain types.
 
     ``stages`` are some of :data:`STAGES`, ``verdict`` always included; the text of an error is kept
     as ``failure``.
@@ -67,7 +67,7 @@ def loops(case: Case) -> bool:
 
 
 def promised(record: dict[str, Any]) -> bool:
-    """Return whether a record proposes an experiment that separates its rivals."""
+    """Return whether a record proposes an experiment that should separate its rivals."""
     plan = record.get("experiment")
     return record.get("verdict") == "ambiguous" and plan is not None and bool(plan["enough"])
 
@@ -116,8 +116,9 @@ def outcome(found: Diagnosis) -> dict[str, Any]:
 def trace_errors(made: Made, found: Diagnosis) -> dict[str, dict[str, Any]]:
     """Return the trace error of every correctly named cause.
 
-    RMS of the difference over that of the truth, both without the part that a refit of the base
-    absorbs, on the output where the truth is largest; also the RMS of both over the usual noise.
+    The error is the RMS of the difference over that of the truth, both without the part that a
+    refit of the base absorbs, on the output where the truth is largest. The RMS of found and true
+    trace over the usual noise is also returned.
     """
     errors = {}
     for truth in made.truths:
@@ -142,7 +143,8 @@ def trace_errors(made: Made, found: Diagnosis) -> dict[str, dict[str, Any]]:
 def loop_of(made: Made, found: Diagnosis) -> dict[str, Any] | None:
     """Return the closed-loop comparison on the hidden rig, with true position errors [mm].
 
-    Under the median load and at the last temperature of the recording, also after a wrong verdict.
+    The load is the median, the temperature the last of the recording. Wrong verdicts are compared
+    too.
     """
     load = float(np.median(made.recording.load))
     celsius = float(made.ground.campaign.temperature_C[-1])

@@ -189,9 +189,7 @@ def hidden(report: dict[str, Any]) -> str:
         for i in (0, 1)
     ]
     rows.sort(key=lambda row: (row[4] == "", row[0], row[1]))
-    note = (
-        "\nA search without pairs would lose the masked causes, which are not significant alone.\n"
-    )
+    note = "\nA search without pairs would miss masked causes, which are not significant alone.\n"
     return table(["cause", "beside", "p alone", "p beside it", ""], rows) + note
 
 

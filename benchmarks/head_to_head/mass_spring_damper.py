@@ -1,7 +1,7 @@
 """Mass-spring-damper with a known force, as a second diagnosable plant.
 
 :class:`MassSpringDamper` implements :class:`pam_envs.diagnosis.fit.least_squares.PlantFamily`.
-With the causes below it is diagnosed as a muscle is, by one output instead of two.
+With the causes below it is diagnosed like a muscle, from one output instead of two.
 """
 
 from __future__ import annotations
@@ -54,10 +54,9 @@ PARAMETERS: Parameters = {
 
 @dataclass(frozen=True)
 class MassSpringDamper(PlainPlant):
-    """Mass-spring-damper with the force [N] of a recording, held from each reading to the next.
+    """Mass-spring-damper under the force [N] of a recording, held from each reading to the next.
 
-    ``period`` is that of sampling [s], ``start`` has starting values that differ from the neutral
-    ones.
+    ``period`` is the sampling period [s]; ``start`` overrides neutral starting values.
     """
 
     force: Array
@@ -81,7 +80,7 @@ class MassSpringDamper(PlainPlant):
         return np.ascontiguousarray(found.T)[None]
 
     def regressors(self, position: Array) -> Regressors:
-        """Return the variables that may explain a residual, from the simulated position [m]."""
+        """Return the regressors of a residual, from the simulated position [m]."""
         time: Array = np.asarray(np.arange(len(position)) * self.period, np.float64)
         speed = np.gradient(position, self.period)
         slow = [low_pass(self.force, tau, self.period) for tau in FILTERS]
@@ -141,7 +140,7 @@ def _late(force: Array, start: float, length: float) -> float:  # pragma: no cov
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _with_friction(a: float, b: float, dry: float) -> float:  # pragma: no cover
-    """Return the v that solves ``a v + dry tanh(v / CREEPING) = b``, by Newton from below."""
+    """Solve ``a v + dry tanh(v / CREEPING) = b`` for v by Newton's method from below."""
     if dry <= 0.0:
         return b / a
     size = abs(b)

@@ -95,19 +95,19 @@ def middle(values: Sequence[float], digits: int = 2) -> str:
 
 
 def flagged(row: Row) -> bool:
-    """Return whether ours reports a model error."""
+    """Return whether our diagnosis reports a model error."""
     return row["ours"]["verdict"] in ("named", "ambiguous", "unexplained")
 
 
 def named(row: Row) -> bool:
-    """Return whether ours names exactly the hidden cause."""
+    """Return whether our diagnosis names exactly the hidden cause."""
     right = [row["effect"]] if row["effect"] else []
     verdict = "named" if right else "adequate"
     return bool(row["ours"]["verdict"] == verdict and row["ours"]["causes"] == right)
 
 
 def by_friction(rows: Sequence[Row]) -> dict[float, list[Row]]:
-    """Return the rows with dry friction or nothing hidden, by friction [N]."""
+    """Return the rows with dry friction or without a hidden effect, by friction [N]."""
     levels = sorted({r["hidden"]["friction"] for r in rows if "friction" in r["hidden"]})
     return {f: [r for r in rows if r["hidden"].get("friction") == f] for f in levels}
 

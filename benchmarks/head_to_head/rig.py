@@ -35,8 +35,8 @@ SETTLED = 2.0
 class Oscillator:
     """Constants of a rig in SI.
 
-    ``friction`` is the dry friction while sliding [N], ``breakaway`` that at rest over it;
-    ``delay`` is that of the force [samples], ``bias`` that of the sensor [m], ``drift`` its drift
+    ``friction`` is the sliding friction [N], ``breakaway`` the ratio of static to sliding friction,
+    ``delay`` the delay of the force [samples], ``bias`` the sensor's bias [m], ``drift`` its drift
     over an experiment [m].
     """
 
@@ -58,7 +58,7 @@ class Oscillator:
         return cls(**constants, breakaway=float(rng.uniform(*BREAKAWAY)), **hidden)  # type: ignore[arg-type]
 
     def positions(self, force: Array) -> Array:
-        """Return the position [m] at each sample, from rest, under a force [N] held in between."""
+        """Return the position [m] at each sample, from rest, under a zero-order-held force [N]."""
         late = np.concatenate([np.zeros(self.delay), force])[: len(force)]
         state, found = (0.0, 0.0), np.empty(len(force))
         for k, value in enumerate(late.tolist()):
@@ -132,7 +132,7 @@ def campaign(seed: int) -> Array:
 
 
 def another(seed: int) -> Array:
-    """Return 40 s of another kind of motion: a chirp and small steps [N]."""
+    """Return 40 s of another excitation: a chirp and small steps [N]."""
     rng = np.random.default_rng([seed, 4])
     time = times(26.0)
     tone = 4.0 * np.sin(2.0 * np.pi * (0.1 + 0.5 * 2.9 * time / time[-1]) * time)

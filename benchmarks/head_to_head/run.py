@@ -2,7 +2,7 @@
 
 ``python -m benchmarks.head_to_head.run`` runs both tools on the same recordings and prints the
 tables; ``--write`` also writes ``docs/head_to_head.md`` and ``results/head_to_head.json``. Without
-the extra ``mujoco`` only ours is run.
+the extra ``mujoco`` only our diagnosis is run.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ START = {"mass": 1.5, "stiffness": 70.0, "damping": 3.0}
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A drawn rig: name of the correct cause (empty without one), hidden constants of the rig."""
+    """A drawn rig: name of the hidden cause (empty without one), and the hidden constants."""
 
     seed: int
     effect: str
@@ -113,7 +113,7 @@ def diagnose(force: Array, reading: Array, rule: Rule | None = None, seed: int =
 def run(case: Case, against: bool, friction: bool = False) -> dict[str, Any]:
     """Return the results of both tools on a case, in plain types.
 
-    MuJoCo runs if ``against``, then also with ``friction`` as a parameter.
+    MuJoCo runs if ``against`` is true, and then also fits dry friction if ``friction`` is true.
     """
     rig, force, fresh = case.rig, campaign(case.seed), another(case.seed)
     reading, truth = rig.readings(force, case.seed), rig.positions(fresh)

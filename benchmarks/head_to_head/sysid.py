@@ -1,7 +1,7 @@
 """Identification of a mass-spring-damper by ``mujoco.sysid`` (extra ``mujoco``).
 
-It has the mechanism, the force, and our bounds and starting values. Issues are the warnings of its
-own report.
+It is given the mechanism, the force, and our bounds and starting values. Issues are the warnings of
+its own report.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def identify(
     parameters = _parameters(start | ({LOSS[0]: LOSS[1]} if friction else {}))
     sequence = _sequence(spec, force, reading, period)
     residual = sysid.build_residual_fn(models_sequences=[sequence], n_threads=1)
-    with redirect_stdout(StringIO()):  # it prints iterations in spite of verbose=False
+    with redirect_stdout(StringIO()):  # it prints iterations despite verbose=False
         found, result = sysid.optimize(parameters, residual, optimizer="mujoco", verbose=False)
     left, (predicted,), _ = residual(found.as_vector(), found, return_pred_all=True)
     _, widths = sysid.calculate_intervals(left, result.jac)
@@ -129,7 +129,7 @@ def _sequence(spec: Any, force: Array, reading: Array, period: float) -> Any:
     times = np.arange(len(force)) * period
     finely = np.arange((len(force) - 1) * each + 1) * STEP
     held = np.repeat(force, each)[: len(finely), None]
-    # the state, not the sensor: a sensor is read before a step and stamped with the time after it
+    # the state, not the sensor: a sensor is read before a step but stamped with the time after it
     shown = sysid.TimeSeries.from_names(times, reading[:, None], model, ["slide_qpos"])
     pushed = sysid.TimeSeries.from_control_names(finely, held, model)
     rest = sysid.create_initial_state(model, np.zeros(1))

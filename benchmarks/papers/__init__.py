@@ -1,1 +1,1 @@
-"""Published figures of the papers beside ours."""
+"""Published figures of the papers compared with ours."""

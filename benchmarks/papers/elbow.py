@@ -61,7 +61,7 @@ def bundle(muscles: int, share: float = 0.28) -> QuadraticBundle:
 
 
 def printed_bundle(muscles: int) -> QuadraticBundle:
-    """Return a bundle with the ``k1`` of Eq. (6) as printed, which no plant takes."""
+    """Return a bundle with the ``k1`` of Eq. (6) as printed, which no plant uses."""
     return dataclasses.replace(bundle(muscles, 0.33), pressure_base=-0.021)
 
 
@@ -135,7 +135,7 @@ def feasible_set() -> Iterator[Figure]:
 
 
 def stiffness_range(plant: ElbowOrthosis, angle: float) -> tuple[float, float]:
-    """Return the least and the largest stiffness [N m/rad] without torque at an angle [rad]."""
+    """Return the smallest and the largest stiffness [N m/rad] without torque at an angle [rad]."""
     shape_a, shape_b, slope_a, slope_b = plant.geometry(angle)
     (low_a, low_b), (high_a, high_b) = plant.coefficients(0.0, 0.0), plant.coefficients(FULL, FULL)
     ends = max(low_a, low_b * shape_b / shape_a), min(high_a, high_b * shape_b / shape_a)
@@ -180,7 +180,7 @@ def force_law() -> Iterator[Figure]:
 
 
 def sign_change(muscles: QuadraticBundle) -> float:
-    """Return the contraction, over the length, at which filling does not change the law's force."""
+    """Return the contraction, over the length, at which the force is independent of pressure."""
     shares = np.linspace(0.2, 0.36, 1601)
     c = shares * muscles.nominal_length
     return float(shares[np.argmin(np.abs(muscles.law(5e5, c) - muscles.law(0.0, c)))])
@@ -220,9 +220,9 @@ def small_motions() -> Iterator[Figure]:
 
 
 def stiffness_of_a_degree(kind: Any, pressure: float, angle: float) -> float:
-    """Return the torque over the angle [N m/rad] of the first degree back after a bend.
+    """Return the stiffness [N m/rad] over the first degree after a reversal.
 
-    The bend of half a radian turns at ``angle`` [rad], with one ``pressure`` [Pa] in both bundles.
+    A motion of half a radian reverses at ``angle`` [rad]; both bundles have one ``pressure`` [Pa].
     """
     plant = ElbowOrthosis.paper(kind)
     q = np.append(np.linspace(angle - 0.5, angle, 201), angle - np.radians(1.0))

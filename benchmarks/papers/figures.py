@@ -15,7 +15,7 @@ GROUPS: tuple[Group, ...] = (
 
 
 def all_figures() -> list[Figure]:
-    """Return every figure; one line with the reason replaces a group that fails."""
+    """Return every figure; a group that fails is replaced by one line with the reason."""
     figures: list[Figure] = []
     for group in GROUPS:
         try:

@@ -1,13 +1,13 @@
-"""Figures of yeh2010 that need the leg or a switch between two controllers.
+"""Figures of yeh2010 with the leg or with a switch between two controllers.
 
 The paper measured the EMG of the thigh with and without the orthosis. The simulation computes
 torques; a reading (:mod:`pam_envs.muscle.emg`) predicts the muscle activity from them. The
 *uncalibrated* reading is scored. With it, an exactly delivered assistance of 20 % reduces activity
 by 20 % at most. The larger published reductions are possible only if the true demand is below Eq.
 (1) (reading A) or if EMG grows faster than torque (reading B). Readings A and B have one constant
-for each activity, *fitted* to the published figures with 20 % of Eq. (1) delivered at once, so that
-reaching these figures proves nothing. Their values behind the paper's low-pass, in stance alone,
-are reported beside them.
+for each activity, *fitted* to the published figures with 20 % of Eq. (1) delivered without delay;
+agreement with these figures is therefore no evidence. Their values with the paper's low-pass, in
+stance only, are reported beside them.
 """
 
 from __future__ import annotations
@@ -77,12 +77,12 @@ def uncalibrated_change(
 ) -> float:
     """Return the change of the EMG proxy's RMS where the assistance is delivered exactly.
 
-    With ``exact`` it is 20 % of Eq. (1) at all times, without low-pass and phases; ``floor`` is the
-    co-contraction, ``changes`` are parameters of the plant, the stride's duration is in s.
+    With ``exact`` the assistance is 20 % of Eq. (1) at all times, without low-pass and phases;
+    ``floor`` is the co-contraction, ``changes`` are parameters of the plant. The stride is in s.
     """
     made = stride_record(activity, stride, changes)
     late = stride_torques(activity, stride, changes)[1]
-    # the record is of the ends of the periods, the curves are of their beginnings
+    # records are taken at the ends of the periods, curves at their beginnings
     helped = 0.2 * made["estimate"] if exact else np.roll(late, -1)
     muscle = MuscleActivation(floor=floor)
     demand, assistance = np.tile(made["demand"], 2), np.tile(helped, 2)
@@ -92,7 +92,7 @@ def uncalibrated_change(
 def estimator_error(stride: float, flat_foot: int = 0, added: tuple[str, ...] = ()) -> float:
     """Return the RMS error [N m] of Eq. (1) in the stance of a walk, stride in s.
 
-    With ``flat_foot`` 1 the lean is the ankle's angle; terms of ``LEFT_OUT`` are added to Eq. (1).
+    With ``flat_foot`` 1 the lean is the ankle angle; terms of ``LEFT_OUT`` are added to Eq. (1).
     """
     made = stride_record("walk", stride, {"shoe.flat_foot": float(flat_foot)})
     leg = KneeOrthosis.on_leg("walk").leg
@@ -129,7 +129,7 @@ def emg_reductions() -> Iterator[Figure]:
 
 
 def _reductions(activity: Activity, title: str) -> Iterator[Figure]:
-    """Yield the uncalibrated reading, and the fitted ones at once and behind the low-pass."""
+    """Yield the uncalibrated reading, and the fitted ones without and with the low-pass."""
     percent = partial(Figure, unit="%", published=100.0 * PUBLISHED[activity])
     plain = 100.0 * uncalibrated_change(activity, PAPER_STRIDE)
     bare = 100.0 * uncalibrated_change(activity, PAPER_STRIDE, exact=True, floor=0.0)
@@ -184,10 +184,10 @@ LATE = (
 
 
 def linear_switch(mismatch: float, compensated: bool) -> tuple[float, float]:
-    """Return the transient when the printed controller takes over on the printed plant.
+    """Return the transient of the switch to the printed controller on the printed plant.
 
     Before the switch the pressure is held at its nominal value and the controller runs off-line
-    with a reference error of ``mismatch`` [N]; afterwards the reference is the true one.
+    with a reference error of ``mismatch`` [N]; afterwards the reference is correct.
 
     Returns the largest error of the tension [N], and the jump of the pressure at the switch [kPa].
     """

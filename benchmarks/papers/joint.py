@@ -1,9 +1,9 @@
 """Figures of the joint's control (fluidic_muscles): PI, robustness, hysteresis, steps, sines.
 
-The paper prints few numbers of its control. The expected values were computed from its equations by
-an independent program. The figures of the PI are judged within 1 %, all others with an expected
-value within 5 %; a miss states its reason. Every loop on the joint's angle (with model-following,
-the disturbance loop) is evaluated around the same nominal plant in continuous time.
+The paper prints few numbers for its control. The expected values were computed from its equations
+by an independent program. The figures of the PI are judged within 1 %, all others with an expected
+value within 5 %; a miss states its reason. Every feedback loop on the joint's angle (for
+model-following, the disturbance loop) is evaluated with the same nominal plant in continuous time.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ GRID = 0.6006743720854 / 99
 def near(
     name: str, ours: float, unit: str, expected: float, share: float | None = NEAR, **more: Any
 ) -> Figure:
-    """Return a figure judged within a share of the expected value; reported if that is None."""
+    """Return a figure judged within a share of the expected value, or only reported without one."""
     band = None if share is None else share * abs(expected)
     words = {"source": CONTROL, "note": BEFORE, **more}
     return Figure(name, ours, unit, tolerance=band, expected=expected, **words)
@@ -139,9 +139,9 @@ def robust_figures() -> Iterator[Figure]:
 class LoopFigures:
     """Figures of one controller's loop.
 
-    ``mu`` is the largest structured singular value, 1 or less if the performance holds for all
-    plants; ``sensitivity`` is ``|S|`` at the frequencies of ``LOW``, ``peak`` its largest value,
-    ``step`` of 10 degrees after a turn, with the assumed hysteresis.
+    ``mu`` is the largest structured singular value, at most 1 for robust performance;
+    ``sensitivity`` is ``|S|`` at the frequencies of ``LOW``, ``peak`` its largest value; ``step``
+    is the response to 10 degrees after a turn, with the assumed hysteresis.
     """
 
     name: str
@@ -233,7 +233,7 @@ def sine_lines() -> Iterator[Figure]:
 
 
 def rise_lines() -> Iterator[Figure]:
-    """Rise of a step of 10 degrees after a turn, for every controller."""
+    """Rise time of a step of 10 degrees after a turn, for every controller."""
     for name in STEPPED:
         found, first = step(name), step(name, Setting(turned=False))
         text = (
@@ -267,7 +267,7 @@ def bound_lines() -> Iterator[Figure]:
 
 
 def ratio_lines() -> Iterator[Figure]:
-    """Rise of the same PI over that of model-following, on three plants, by size and turn."""
+    """Rise time of the same PI over that of model-following, on three plants, by size and turn."""
     for plant, size, turned in CASES:
         alone, best = (plant_step(plant, n, size, turned) for n in ("joint_pi", BEST))
         text = (

@@ -26,9 +26,9 @@ Array = NDArray[np.float64]
 def loop_path(
     plant: Any, model: JointModel, amplitude: float = 20.0 * DEGREE
 ) -> tuple[Array, Array]:
-    """Return desired and reached angles [rad]: a first rise, then down and up once.
+    """Return desired and reached angles [rad]: an initial rise, then one cycle down and up.
 
-    The hysteresis of the model is inverted for the set-points of the plant's ``rest_angles``.
+    The setpoints of the plant's ``rest_angles`` come from the inverse of the model's hysteresis.
     """
     up = np.linspace(-amplitude, amplitude, 81)
     desired = np.concatenate([np.linspace(0.0, amplitude, 41), up[::-1], up])
@@ -41,13 +41,13 @@ def loop_path(
 
 
 def loop_width(plant: Any, model: JointModel, amplitude: float = 20.0 * DEGREE) -> float:
-    """Return the largest width [rad] of the loop that :func:`loop_path` goes through."""
+    """Return the largest width [rad] of the loop of :func:`loop_path`."""
     reached = loop_path(plant, model, amplitude)[1]
     return float(np.max(np.abs(reached[41:122][::-1] - reached[122:])))
 
 
 def width_ratio(plant: Any, amplitude: float = 10.0 * DEGREE) -> float:
-    """Return the loop's width with a line for the inverse, over that with the inverse.
+    """Return the loop width with a straight line for the inverse, over that with the inverse.
 
     If the plant is a Preisach operator itself, the ratio shows only the resolution of the
     identified map.
@@ -58,7 +58,7 @@ def width_ratio(plant: Any, amplitude: float = 10.0 * DEGREE) -> float:
 
 
 def inhomogeneous() -> Preisach:
-    """Return a hysteresis whose relays' density varies by 30 % over the range, starting low."""
+    """Return a hysteresis whose relay density varies by 30 %, starting at its lowest output."""
 
     def density(a: Array, b: Array) -> Array:
         return np.asarray((1.0 + 0.3 * np.cos(0.5 * np.pi * (a + b) / RANGE)) * np.exp(-(a - b)))
@@ -69,9 +69,9 @@ def inhomogeneous() -> Preisach:
 
 
 def inverse_error(histories: int = 60) -> tuple[float, float]:
-    """Return the errors of the recursion and of the printed sum (3.5), as parts of the range.
+    """Return the errors of the recursion and of the printed sum (3.5), relative to the range.
 
-    The recursion's is that of the output after its input, the sum's that of the input itself.
+    For the recursion it is the error of the output, for the sum the error of the input.
     """
     model, draw = inhomogeneous(), np.random.default_rng(2)
     top = float(model.everett[-1, 0])

@@ -52,7 +52,7 @@ AFTER_TURN, TOTAL = 0.65, 1.1
 """Gain after a turn, the low end of the uncertain gain, and with all plays moving."""
 PLANTS = ("study", "reduced", "paper")
 SIZES = (5.0, 10.0, 15.0, 20.0)
-"""Of the steps [deg]."""
+"""Sizes of the steps [deg]."""
 CASES = tuple(product(PLANTS, SIZES, (True, False)))
 """Plant, size [deg], and whether the step follows a turn."""
 STEPPED = (
@@ -74,9 +74,9 @@ ACTIONS = Signals([Signal("angle_set_point", "rad", -RANGE, RANGE, 0, normalized
 
 @cache
 def assumed_hysteresis(width: float = 1.0) -> Preisach:
-    """Return the hysteresis of the reduced plant, from set-point [rad] to ``w`` [rad].
+    """Return the hysteresis of the reduced plant, from setpoint [rad] to ``w`` [rad].
 
-    ``width`` is that of the loops over the assumed ones; 0: no hysteresis.
+    ``width`` scales the assumed loop width; 0: no hysteresis.
     """
     weights = ((TOTAL - AFTER_TURN) / len(THRESHOLDS),) * len(THRESHOLDS)
     plays = PlayOperator(tuple(DEGREE * r for r in THRESHOLDS), weights, AFTER_TURN)
@@ -86,7 +86,7 @@ def assumed_hysteresis(width: float = 1.0) -> Preisach:
 
 @dataclass(frozen=True)
 class ReducedRig:
-    """The reduced plant, both as the simulated plant and as the model of the controllers."""
+    """The reduced plant, used as simulated plant and as model of the controllers."""
 
     width: float = 1.0
     stages: int = 1
@@ -103,16 +103,16 @@ class ReducedRig:
         return f"reduced rig {self.width}"
 
     def rest_angles(self, commands: Array) -> Array:
-        """Return the angles at rest [rad] after each of a series of set-points."""
+        """Return the angles at rest [rad] after each of a series of setpoints."""
         return self.hysteresis.simulate(commands)[0]
 
 
 @dataclass(frozen=True)
 class Run:
-    """Record of a run: time [s] and angle [rad] every 1 ms, and once a period the set-point [rad].
+    """Record of a run: time [s] and angle [rad] every 1 ms, setpoint [rad] once per control period.
 
-    ``model`` is the angle [rad] of the controller's model at the end of each period, empty if it
-    has none.
+    ``model`` is the angle [rad] of the controller's model at the end of each period, empty for a
+    controller without one.
     """
 
     time: Array
@@ -129,8 +129,8 @@ def run(
 ) -> Run:
     """Run a controller on the reduced plant from rest at 0.
 
-    The reference [rad] has a value for each control instant; ``disturbance`` gives what is added to
-    the angle [rad] at times [s].
+    The reference [rad] has a value for each control instant; ``disturbance`` returns the output
+    disturbance of the angle [rad] at times [s].
     """
     motion, hysteresis = discrete(double_lag(POLE), FINE, "zoh"), rig.hysteresis
     fine = round(rig.control_period / FINE)
@@ -159,7 +159,7 @@ def controller(name: str, rig: ReducedRig) -> Any:
 
 @dataclass(frozen=True)
 class StepFigures:
-    """Rise from 10 to 90 % [s], overshoot [%], and settling to within 2 % for good [s]."""
+    """Rise time from 10 to 90 % [s], overshoot [%], and 2 % settling time [s]."""
 
     rise: float
     overshoot: float
@@ -186,10 +186,10 @@ def _reached(t: Array, y: Array, level: float) -> float:
 
 @dataclass(frozen=True)
 class Setting:
-    """Circumstances of a step of a size [rad] at a control period [s].
+    """Conditions of a step of a size [rad] at a control period [s].
 
-    ``width`` is that of the hysteresis loops over the assumed ones; a step is ``turned`` if it is
-    the second of two with one back in between.
+    ``width`` scales the assumed loop width. A ``turned`` step is the second of two equal steps,
+    with a step back between them.
     """
 
     width: float = 1.0
@@ -200,7 +200,7 @@ class Setting:
 
 @cache
 def step_run(name: str, setting: Setting = Setting()) -> Run:
-    """Return the run of two steps and one back with a controller of the catalogue."""
+    """Return the run of a step, a step back and a second step with a catalogue controller."""
     rig = ReducedRig(setting.width, control_period=setting.period)
     reference = setting.size * np.repeat([1.0, 0.0, 1.0], round(HOLD / setting.period))
     return run(controller(name, rig), reference, rig)
@@ -216,7 +216,7 @@ def step(name: str, setting: Setting = Setting()) -> StepFigures:
 
 
 def plant_run(joint: AntagonisticJoint, name: str, size: float) -> Array:
-    """Return the angles [rad] at 0, 10 ms, ... of two steps [deg] and one back, without noise."""
+    """Return noise-free angles [rad] every 10 ms of a step [deg], a step back and a second step."""
     joint = joint.without_noise()
     reference = size * DEGREE * np.repeat([1.0, 0.0, 1.0], round(HOLD / PERIOD))
     env: Any = gymnasium.make(
@@ -239,7 +239,7 @@ def _angles(plant: str, name: str, size: float) -> Array:
 def plant_step(plant: str, name: str, size: float, turned: bool) -> StepFigures:
     """Return the figures of a step [deg] on one of ``PLANTS``, see :class:`Setting`.
 
-    Between the control instants of an environment the angle goes along a cubic spline.
+    Between the control instants of an environment the angle is interpolated by a cubic spline.
     """
     if plant == "study":
         return step(name, Setting(size=size * DEGREE, turned=turned))
@@ -264,7 +264,7 @@ def tracking_error(name: str, period: float = PERIOD) -> tuple[float, float]:
     """Return the RMS error of a sine [% of the amplitude], and to the model's output [deg].
 
     The sine of 20 degrees and 0.5 Hz is sampled at the control period [s]; the first of three
-    cycles is left out. Without a model the second error is not a number.
+    cycles is omitted. Without a model the second error is NaN.
     """
     frequency, amplitude = 0.5, 20.0 * DEGREE
     rig = ReducedRig(control_period=period)

@@ -1,9 +1,9 @@
-"""Figures of yeh2010 that need no leg: loop shape, hysteresis inverse, tracking.
+"""Figures of yeh2010 without the leg: loop shape, hysteresis inverse, tracking.
 
 Two presets of the rig, because the printed figures fit no single one: *static* has a lag of
-0.0466 s behind the hysteresis (the printed plant's 0.3 s would alone give 13 % where 2.07 % is
+0.0466 s after the hysteresis (the 0.3 s of the printed plant would alone give 13 % where 2.07 % is
 reported), *dynamic* the printed plant over its static gain. An error is a root mean square over the
-half-range of the reference, the first 2 s dropped as the paper's transient.
+half-range of the reference, without the first 2 s, the paper's transient.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ LINE = {0.0: 0.94, 0.25e5: 1.25, 0.5e5: 1.59}
 """Errors [%] with a straight line as feedforward, which is not in the paper: computed by an
 independent program with other anchors of the loops."""
 ALONE = {0.0: 5.05, 0.5e5: 5.52}
-"""The same without any feed-forward: from 5.05 to 5.52."""
+"""The same without any feedforward: from 5.05 to 5.52."""
 PRINTED = {"LTR": 4.66, "LTR + inverse": 1.33}
 """[%]; the first is 3.5 times the second, as the paper has it, of one rig whose loop width it does
 not give."""
@@ -56,13 +56,13 @@ START_TENSION = 55.0
 
 
 def half_range_error(signal: Array, reference: Array, period: float) -> float:
-    """Return the error in percent of the half-range of the reference, the first 2 s dropped."""
+    """Return the RMS error in percent of the half-range of the reference, without the first 2 s."""
     error = (signal - reference)[round(DROPPED / period) :]
     return 100.0 * rms(error) / (0.5 * float(np.ptp(reference)))
 
 
 def stiffness_tracking(friction: float = FRICTION, lag: float = LAG) -> tuple[float, float]:
-    """Return the errors [%] of the inverse and of the nominal straight line, preset static.
+    """Return the errors [%] of the inverse and of the nominal straight line with the preset static.
 
     ``friction`` is the pressure [Pa] that the elements hold together, ``lag`` in s.
     """
@@ -78,7 +78,7 @@ def stiffness_tracking(friction: float = FRICTION, lag: float = LAG) -> tuple[fl
 
 
 def _lagged(signal: Array, lag: float, step: float) -> Array:
-    """Return the output of a first-order lag for an input that goes straight between samples."""
+    """Return the output of a first-order lag for an input that is linear between samples."""
     keep = float(np.exp(-step / lag))
     slope = lag / step * (1.0 - keep)
     out = np.empty_like(signal)
@@ -90,7 +90,7 @@ def _lagged(signal: Array, lag: float, step: float) -> Array:
 
 @dataclass(frozen=True)
 class Tracking:
-    """Errors [%] of tension tracking at one loop width, preset dynamic."""
+    """Errors [%] of tension tracking at one loop width with the preset dynamic."""
 
     feedback: float
     with_inverse: float
@@ -98,7 +98,7 @@ class Tracking:
 
 
 def tension_tracking(friction: float) -> Tracking:
-    """Return the errors of the printed controller alone and with two feed-forwards.
+    """Return the errors of the printed controller alone and with either of two feedforwards.
 
     ``friction`` is the pressure [Pa] that the elements hold together.
     """

@@ -1,7 +1,7 @@
 """Figures of yeh2010 in the environments, with the paper's control system.
 
-In :mod:`benchmarks.papers.knee` the printed transfer functions act on the hysteresis alone; here
-the plant is complete.
+:mod:`benchmarks.papers.knee` combines the printed transfer functions with the hysteresis alone;
+here the plant is complete.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Runs of the knee environments for comparison with yeh2010.
 
-An error is a root mean square over the half-range of the reference, the first 2 s dropped as the
-paper's transient. Sensors show the truth, and the controllers know the plant.
+An error is a root mean square over the half-range of the reference, without the first 2 s, the
+paper's transient. Sensors are ideal, and the controllers know the plant.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ IDS: dict[Activity, str] = {
 
 @dataclass(frozen=True)
 class TensionErrors:
-    """Errors [%] of tension tracking by the feedback alone, and with two feed-forwards."""
+    """Errors [%] of tension tracking by the feedback alone, and with either of two feedforwards."""
 
     feedback: float
     with_line: float
@@ -53,10 +53,10 @@ class TensionErrors:
 class Switch:
     """Transient after switches from swing to stance, the mean over strides.
 
-    ``tension`` is the largest error [N] in the first 0.5 s; ``at_switch`` that of the first period
-    of stance, left behind by the swing's controller; ``excess`` is by how much [N] the largest
-    error is above it, the transient of the one taking over; ``command`` the change of the set-point
-    [Pa] from one period to the next at the switch.
+    ``tension`` is the largest error [N] in the first 0.5 s. ``at_switch`` is the error of the first
+    period of stance, caused by the swing controller; ``excess`` is the difference [N] of the two,
+    the transient of the stance controller. ``command`` is the change of the setpoint [Pa] over the
+    control period of the switch.
     """
 
     tension: float
@@ -73,10 +73,10 @@ def tension_errors(
 ) -> TensionErrors:
     """Return the errors of tracking a tension of 0.1 Hz in ``PAM/KneeTension-v0``.
 
-    ``width`` is the pressure [Pa] that all elements of the hysteresis hold together. The feedback
-    is controller (11), or our design on the identified plant; the mounting the isometric preset, 80
-    to 330 N, or the wearable one, 80 to 205 N; the dynamics the published frequency response, or
-    the regulator's lag.
+    ``width`` is the sum of the pressures [Pa] of all hysteresis elements. The feedback is
+    controller (11), or our design on the identified plant; the mounting the isometric preset, 80 to
+    330 N, or the wearable one, 80 to 205 N; the dynamics the published frequency response, or the
+    regulator's lag.
     """
     preset = {"rig": KneeOrthosis.rig, "no_load": KneeOrthosis.no_load}[mounting]
     plant = preset(dynamics=dynamics, hysteresis__width=width / PRESET_FRICTION).without_noise()
@@ -117,12 +117,12 @@ def stride(
     preview: bool = False,
     pace: float = PAPER_STRIDE,
 ) -> Mapping[str, NDArray[np.float64]]:
-    """Return the signals (SI) of three strides with the paper's control system, at rest at contact.
+    """Return the signals (SI) of three strides from rest at contact, with the paper's control.
 
-    While the tension is off-line its reference is off by ``mismatch`` [N]. ``bumpless`` turns on
-    the compensators of bumpless transfer; with ``preview`` the feed-forward looks one lag of the
-    regulator ahead, as the paper's does not; ``pace`` is the duration of a stride [s]. The keys are
-    those of the environment's ``info``, and ``set_point`` [Pa].
+    While the tension controller is off-line, its reference has an error of ``mismatch`` [N].
+    ``bumpless`` turns on the compensators of bumpless transfer. With ``preview`` the feedforward
+    has a preview of one lag of the regulator, unlike the paper's. ``pace`` is the duration of a
+    stride [s]. The keys are those of the environment's ``info``, and ``set_point`` [Pa].
     """
     plant = KneeOrthosis.on_leg(activity, stride=pace).without_noise()
     env: Any = gym.make(
@@ -148,8 +148,7 @@ def switching(
 ) -> Switch:
     """Return the transient after the switches to stance in ``PAM/KneeWalk-v0``, see :func:`stride`.
 
-    A set-point of the last period of swing is compared with the first that the tension's controller
-    gives.
+    The setpoint of the last period of swing is compared with the first of the tension controller.
     """
     signals, period = stride("walk", mismatch, bumpless, preview, pace), KneeOrthosis.control_period
     starts = metrics_knee.landings(signals["sensor/stance"], period)
@@ -166,7 +165,7 @@ def switching(
 
 
 def emg_ratios(activity: Activity = "walk") -> dict[str, float]:
-    """Return the EMG proxy's assisted over unassisted RMS in its readings, over whole strides.
+    """Return the ratio of assisted to unassisted RMS of the EMG proxy over whole strides.
 
     The names are those of the ``emg_`` metrics of :data:`benchmarks.scoring.knee.GAIT`.
     """

@@ -1,9 +1,9 @@
-"""Figures of path planning of the manipulator (fluidic_muscles, section 2).
+"""Figures of the manipulator's path planning (fluidic_muscles, section 2).
 
 The paper shows two plans of one path; its only number is the limit of 30 degrees. The expected
 values were computed by an independent program for three paths. The ends of one path are known; the
-other two paths were chosen to have these peaks, which are therefore inputs and not judged. Freely
-drawn paths show the effect of the weight without any fit.
+other two paths were chosen to have the expected peaks, which are therefore inputs and not judged.
+Freely drawn paths show the effect of the weight without any fit.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ def arm() -> SerialChain:
 
 @lru_cache(maxsize=8)
 def plans(path: PathEnds) -> Comparison:
-    """Return both plans of a path, begun from its first angles."""
+    """Return both plans of a path, started from its first angles."""
     line = path.angles()
     return compare(arm(), arm().pose(line), start=line[0])
 
 
 def straight_poses(path: PathEnds) -> Array:
-    """Return poses from end to end of a path on a straight line of the tip, shape (41, 6).
+    """Return the poses of a straight line of the tip between the ends of a path, shape (41, 6).
 
-    The direction turns evenly in the plane of both ends' directions.
+    The direction turns at a constant rate in the plane of the directions at both ends.
     """
     first, last = arm().pose(path.angles()[[0, -1]])
     share = np.linspace(0.0, 1.0, POINTS)[:, None]
@@ -86,8 +86,8 @@ def peaks() -> Iterator[Figure]:
 class HeldOut:
     """Statistics of freely drawn paths, as shares of all.
 
-    On a ``crossed`` path a joint exceeds 30 degrees, on a ``leapt`` one the plan leaps between
-    branches of solutions; ``iterations`` is the largest of the medians of the weighted plans.
+    On a ``crossed`` path a joint exceeds 30 degrees, on a ``leapt`` one the plan jumps between
+    solution branches; ``iterations`` is the largest of the medians of the weighted plans.
     """
 
     paths: int
@@ -102,7 +102,7 @@ class HeldOut:
 def held_out(number: int = HELD_OUT, seed: int = 0) -> HeldOut:
     """Return the statistics of freely drawn paths with both ends within 27 degrees a joint.
 
-    Short and nearly straight paths are not drawn; no drawn path is left out.
+    Short and nearly straight paths are not drawn; no drawn path is excluded.
     """
     counts, most = np.zeros(4), 0.0
     for first, last in zip(*draw_ends(seed, number, arm().stages, LIMIT), strict=True):
@@ -117,7 +117,7 @@ def held_out(number: int = HELD_OUT, seed: int = 0) -> HeldOut:
 
 
 def drawn_lines() -> Iterator[Figure]:
-    """Share of freely drawn paths on which joints exceed their limit or the plan leaps."""
+    """Share of freely drawn paths on which joints exceed their limit or the plan changes branch."""
     found = held_out()
     text = f"of {found.paths} freely drawn paths, none left out"
     leap = f"{text}; most do so along a hundred times as many poses: the branch of solutions ends"
@@ -146,7 +146,7 @@ def other_reading() -> Iterator[Figure]:
 
 
 def prices() -> Iterator[Figure]:
-    """Growth of ``q'q`` by the weight, at the end of each path."""
+    """Increase of ``q'q`` due to the weight, at the end of each path."""
     for path in PATHS:
         yield Figure(
             f"{path.name}: growth of q'q",
@@ -161,7 +161,7 @@ def prices() -> Iterator[Figure]:
 
 
 def newton() -> Iterator[Figure]:
-    """Newton's method on the weighted plans: iterations, and errors left."""
+    """Newton's method on the weighted plans: iterations and remaining errors."""
     for path in PATHS:
         plan, desired = plans(path).weighted, arm().pose(path.angles())
         name, number = f"{path.name}: median iterations", float(np.median(plan.iterations))

@@ -1,4 +1,4 @@
-"""Pictures beside the papers': a stride with the knee orthosis, a step of the joint.
+"""Counterparts of the papers' figures: a stride with the knee orthosis, a step of the joint.
 
 yeh2010, Fig. 12 and 13; fluidic_muscles, Fig. 10 and 16.
 """
@@ -28,7 +28,7 @@ LOOK_AFTER = 0.5
 
 
 def spans(flags: Array, time: Array) -> list[tuple[float, float]]:
-    """Return the times between which flags are set."""
+    """Return start and end time of each interval in which a flag is set."""
     edges = np.diff(np.concatenate([[0], (flags > 0.5).astype(int), [0]]))
     ends = np.append(time, 2.0 * time[-1] - time[-2])
     starts, stops = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
@@ -36,7 +36,7 @@ def spans(flags: Array, time: Array) -> list[tuple[float, float]]:
 
 
 def cut(signals: Signals, first: float, last: float) -> dict[str, Array]:
-    """Return a record from one time [s] to another, its clock set to 0 at its first contact."""
+    """Return a record from one time [s] to another, with time 0 at its first heel contact."""
     time = signals["time"]
     kept = (time > first - 1e-9) & (time < last + 1e-9)
     made = {name: values[kept] for name, values in signals.items()}
@@ -48,7 +48,7 @@ def cut(signals: Signals, first: float, last: float) -> dict[str, Array]:
 def stride_figure(records: Sequence[Signals], titles: Sequence[str], title: str) -> Figure:
     """Return a figure with a column for each record: tension, angle, pressure, EMG proxy.
 
-    A record is ``info`` in SI, ``time`` 0 at a heel contact, and ``set_point`` [Pa].
+    A record is ``info`` in SI with ``set_point`` [Pa]; its ``time`` is 0 at a heel contact.
     """
     figure = Figure(figsize=(11.0, 10.0), layout="constrained")
     grid = figure.subplots(4, len(records), sharex=True, sharey="row", squeeze=False)
@@ -74,7 +74,7 @@ ROWS = (
     ("pressure [bar]", 5.6, "upper right"),
     ("EMG proxy of the\nextensors [% of largest]", 36.0, "upper right"),
 )
-"""Label, upper end and place of the legend of each row."""
+"""Label, upper limit and legend position of each row."""
 
 
 def _shade(ax: Any, signals: Signals) -> None:
@@ -164,11 +164,11 @@ LINES = {
 }
 """Label, colour and style of each controller."""
 SHOWN_SECONDS = 1.2
-"""Of the step in the picture."""
+"""Size of the step in the picture."""
 
 
 def step_figure() -> Figure:
-    """Return a figure: a step after a turn, and the muscles' loop with and without the inverse."""
+    """Return a figure of a step after a turn, and of the loop with and without the inverse."""
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")
     ax, right = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
     _draw_loops(right)

@@ -25,10 +25,9 @@ SIMULATED = 0.3
 
 
 def loop_width(pressure: Array, contraction: Array) -> tuple[Array, Array]:
-    """Return pressures [Pa] and widths [m], shape (n,), of a loop up and down the same pressures.
+    """Return pressures [Pa] and widths [m], shape (n,), of a loop with equal pressures up and down.
 
-    Pressures and contractions, shape (2 n - 1,), are in the order of the path, the turning point
-    once.
+    Pressures and contractions, shape (2 n - 1,), are in path order, with the turning point once.
     """
     n = len(pressure) // 2
     return pressure[: n + 1], contraction[::-1][: n + 1] - contraction[: n + 1]

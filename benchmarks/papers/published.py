@@ -1,4 +1,4 @@
-"""Published figures beside ours, each with its tolerance."""
+"""Published figures compared with ours, each with its tolerance."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ UNKNOWN = float("nan")
 
 @dataclass(frozen=True)
 class Figure:
-    """One published figure beside ours; ``None`` of ours that could not be computed.
+    """A published figure compared with ours, which is ``None`` if it could not be computed.
 
-    ``published`` is what the paper prints, ``expected`` what an independent program computed from
-    its equations. ``tolerance`` is the largest difference from ``expected``, or from ``published``
-    if nothing is expected. A ``given`` figure is an input, shown and never judged. ``why`` is the
+    ``published`` is the paper's number, ``expected`` the result of an independent program from its
+    equations. ``tolerance`` is the largest accepted difference from ``expected``, or from
+    ``published`` without it. A ``given`` figure is an input, shown but not judged. ``why`` is the
     reason of a known miss.
     """
 
@@ -90,7 +90,7 @@ def note(*words: str) -> str:
 
 
 def aligned(lines: Sequence[Sequence[str]]) -> str:
-    """Return the lines of a table with columns of even width."""
+    """Return the lines of a table with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()

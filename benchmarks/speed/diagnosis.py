@@ -39,7 +39,7 @@ print(verdict - start, time.perf_counter() - verdict, found.verdict, *found.caus
 
 
 def write_case(folder: Path) -> None:
-    """Write ``recording.csv`` and ``rig.yaml`` of a rig that creeps, as its owner would."""
+    """Write ``recording.csv`` and ``rig.yaml`` of a rig with creep."""
     from tests.diagnosis import hidden
 
     rng = np.random.default_rng(SEED)

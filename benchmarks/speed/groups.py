@@ -49,7 +49,7 @@ def attempt(group: str, probe: Probe, rounds: int) -> list[Measurement]:
         note = str(reason)
     except ModuleNotFoundError as error:
         note = f"{error.name} is not installed"
-    except Exception as error:  # a figure that fails must not cost the others
+    except Exception as error:  # a failed figure must not prevent the others
         note = f"failed: {type(error).__name__}: {error}"
     title = (probe.__doc__ or probe.__name__).splitlines()[0].rstrip(".")
     return [Measurement(group, title, None, "", note=note)]

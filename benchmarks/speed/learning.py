@@ -1,4 +1,4 @@
-"""Speed of training, and the share of its time that the environments take."""
+"""Speed of training, and the environments' share of its time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST = 0.05
 
 
 def learning(rounds: int) -> list[Measurement]:
-    """PPO at 256 environments against the default on one Pendulum."""
+    """PPO at 256 environments compared with the default on one Pendulum."""
     from agents.settings.presets import preset
     from agents.training import building
 
@@ -54,7 +54,7 @@ def rollouts_of(model: Any) -> Chunk:
 
 
 def shares(rounds: int) -> list[Measurement]:
-    """Environments' share of the time of each PPO preset."""
+    """Environments' share of the training time of each PPO preset."""
     from agents.settings.presets import preset
     from agents.training import building
     from pam_envs.__main__ import env_ids
@@ -83,7 +83,7 @@ def _share(name: str, env: Any, chunk: Chunk, rounds: int) -> Measurement:
 
 
 def batches_of(env: Any) -> Iterator[Any]:
-    """Yield the batches of plants below the wrappers of training."""
+    """Yield the batches of plants inside the training wrappers."""
     if hasattr(env, "venv"):
         yield from batches_of(env.venv)
     else:
@@ -91,7 +91,7 @@ def batches_of(env: Any) -> Iterator[Any]:
 
 
 def _timed(batch: Any) -> Callable[[], float]:
-    """Make a batch count the CPU seconds of its steps; return a function that reads the count."""
+    """Make a batch sum the CPU seconds of its steps; return a function that reads the sum."""
     plain, total = batch.step, [0.0]
 
     def step(actions: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Probes of environments, batches, start-up and training. An absent library costs only its line."""
+"""Probes of environments, batches, start-up and training; a missing library omits only its line."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _batch(number: int, mode: str = "vector_entry_point", **kwargs: Any) -> Any:
 
 
 def _peers(subjects: dict[str, Chunk], steps: dict[str, int]) -> dict[str, str]:
-    """Add environments of other libraries; return by name why one is not installed."""
+    """Add environments of other libraries; return by name the reason for each missing one."""
     gym, notes = _gym(), {}
     for name, number in steps.items():
         try:
@@ -116,7 +116,7 @@ def single(rounds: int) -> list[Measurement]:
 
 
 def single_joints(rounds: int) -> list[Measurement]:
-    """Elbow with either make of valves, one joint, and an arm of six, beside MuJoCo's hopper."""
+    """Elbow with either type of valves, one joint, arm of six, compared with MuJoCo's hopper."""
     gym = _gym()
     subjects = {
         "elbow": stepping(gym.make(ELBOW), 5000),
@@ -215,7 +215,7 @@ def growth(rounds: int) -> list[Measurement]:
 
 
 def cores(rounds: int) -> list[Measurement]:
-    """All cores over one, from 4,096 environments on."""
+    """Speed-up of all cores over one, from 4,096 environments on."""
     number = len(os.sched_getaffinity(0))
     if number < 2:
         raise Missing("there is one core only")
@@ -235,7 +235,7 @@ def cores(rounds: int) -> list[Measurement]:
 
 
 def processes(rounds: int) -> list[Measurement]:
-    """Against AsyncVectorEnv of the same environment, wall."""
+    """Comparison with AsyncVectorEnv of the same environment, wall time."""
     pool = _batch(16, "async")
     try:
         subjects = {
@@ -256,7 +256,7 @@ def processes(rounds: int) -> list[Measurement]:
 
 
 def planning(rounds: int) -> list[Measurement]:
-    """Joint angles for the poses of the arm's three paths, there and back."""
+    """Inverse kinematics of the poses on the arm's three paths, there and back."""
     arm = SerialChain.uniform()
     lines = [np.vstack([path.angles(), path.angles()[::-1]] * REPEATS) for path in PATHS]
     paths = [(arm.pose(line), line[0]) for line in lines]
@@ -302,7 +302,7 @@ def _python(code: str, *arguments: str, **environment: str) -> str:
 
 
 def uncompiled(rounds: int) -> list[Measurement]:
-    """Uncompiled single step against InvertedPendulum-v5."""
+    """Uncompiled single step compared with InvertedPendulum-v5."""
     rates = json.loads(_python(_UNCOMPILED, str(rounds), PAM_ENVS_COMPILE="0"))
     value = ratio(rates["ours"], rates["peer"])
     return [
@@ -344,10 +344,10 @@ print(time.process_time())
 
 
 def start_up(rounds: int) -> list[Measurement]:
-    """Import and first step in a fresh interpreter, and the way to machine code.
+    """Import and first step in a fresh interpreter, and the change to machine code.
 
-    An environment begins in plain Python and changes to machine code after some steps; what that
-    takes is measured beside the first step, and has no target.
+    An environment begins in plain Python and changes to machine code after some steps. The time of
+    that change is measured beside the first step, and has no target.
     """
     from pam_envs.envs.core.plant_env import INTERPRETED_CALLS
 

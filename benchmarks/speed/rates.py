@@ -1,7 +1,7 @@
 """Rates measured in one process, in interleaved rounds, and their table.
 
 A rate is the median over rounds, a ratio the median of the ratios within each round, so that a
-busy machine slows both sides alike. Times are CPU seconds of the process unless *wall* is stated.
+busy machine slows both sides equally. Times are CPU seconds of the process unless *wall* is stated.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Chunk = Callable[[], int]
 
 
 class Missing(Exception):
-    """A requirement of a measurement is absent; the message names it."""
+    """A missing requirement of a measurement; the message names it."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Measurement:
 
     @property
     def verdict(self) -> str:
-        """One word for the table."""
+        """Verdict in one word for the table."""
         if self.value is None:
             return "not measured"
         if self.passed is None:

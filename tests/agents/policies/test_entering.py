@@ -110,15 +110,15 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], str]] = {
     ),
     "set by hand": (
         [{"seed": 0, "command": f"{COMMAND} --config policy.onnx"}],
-        "save them as agents/configs/KneeWalk-v0.ppo-VARIANT.yaml",
+        "as agents/configs/KneeWalk-v0.ppo-VARIANT.yaml",
     ),
     "an unknown preset": (
         [{"seed": 0, "command": f"{COMMAND} --variant mine"}],
-        "is of the preset KneeWalk-v0.ppo-mine, and KneeWalk-v0 has ppo, ppo-randomized, ppo-resid",
+        "KneeWalk-v0.ppo-mine.yaml, or train one of ppo, ppo-randomized, ppo-resid",
     ),
     "other settings": (
         [{"seed": 0, "config": changed(ppo__gamma=0.5, steps=7)}],
-        "was trained with ppo, steps other than KneeWalk-v0.ppo.yaml has now; train it anew",
+        "other values of ppo, steps than KneeWalk-v0.ppo.yaml has now; train it anew",
     ),
     "unknown settings": ([{"seed": 0, "config": {"stepps": 3}}], "run0: unknown setting 'stepps'"),
 }

@@ -52,13 +52,13 @@ def test_users_residual_is_recognised_by_its_settings(presets: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("KneeWalk-v0.ppo-Mine", BASE, "'ppo_Mine_knee_walk', which is no name; name its file"),
+        ("KneeWalk-v0.ppo-Mine", BASE, "'ppo_Mine_knee_walk', which is not a valid name; name"),
         ("KneeWalk-v0.ppp", BASE, "ppp.yaml is for PAM/KneeWalk-v0 with ppo; name its file"),
         ("KneeTension-v0.ppo-mine", BASE, "is for PAM/KneeWalk-v0 with ppo; name its file"),
         (
             "MusclePositioning-v0.ppo-knee_walk",
             "extends: MusclePositioning-v0.ppo\n",
-            "'ppo_knee_walk', as another is; name its file ENV.ALGO-VARIANT.yaml",
+            "'ppo_knee_walk', which is already in use; name its file ENV.ALGO-VARIANT.yaml",
         ),
         (
             "KneeWalk-v0.ppo-wrong",

@@ -89,12 +89,12 @@ def test_controller_with_other_answers_is_refused(
         return dataclasses.replace(made, inverse=_with_horizon(made.inverse))
 
     monkeypatch.setattr(MAKE, later)
-    with pytest.raises(PolicyFileError, match=r"answers otherwise: by 0.* of at most 0.0003"):
+    with pytest.raises(PolicyFileError, match=r"recorded actions by 0.*, more than 0.0003"):
         with_controller(file, plant)
     monkeypatch.setattr(
         "agents.policies.residual.make_controller", lambda *parts: Shifted(make(*parts), 1e-3)
     )
-    with pytest.raises(PolicyFileError, match="answers otherwise"):
+    with pytest.raises(PolicyFileError, match="deviates from its recorded actions"):
         with_controller(file, plant)
     monkeypatch.setattr(
         "agents.policies.residual.make_controller", lambda *parts: Shifted(make(*parts), 1e-7)
@@ -143,7 +143,7 @@ def test_controller_at_a_limit_cannot_be_recorded() -> None:
         def predict(self, observation: Any, state: Any = None, start: Any = None) -> Any:
             return np.ones((len(observation), 1), np.float32), None
 
-    with pytest.raises(SettingsError, match="'stuck' is at a limit in more than 10%"):
+    with pytest.raises(SettingsError, match="'stuck' is saturated in more than 10%"):
         recording.record(ID, [{}], Stuck(), "stuck")
 
 

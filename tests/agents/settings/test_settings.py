@@ -104,7 +104,7 @@ def test_presets_that_extend_each_other_are_refused(
     for own, other in (("A-v0.ppo", "B-v0.ppo"), ("B-v0.ppo", "A-v0.ppo")):
         (tmp_path / f"{own}.yaml").write_text(f"extends: {other}\n")
     monkeypatch.setattr(configs, "FOLDER", tmp_path)
-    with pytest.raises(SettingsError, match=r"circle \(B-v0.ppo -> A-v0.ppo -> B-v0.ppo\)"):
+    with pytest.raises(SettingsError, match=r"circular \(B-v0.ppo -> A-v0.ppo -> B-v0.ppo\)"):
         configs.read(tmp_path / "A-v0.ppo.yaml")
 
 
