@@ -79,7 +79,7 @@ def _uniform(seed: np.uint64, row: NDArray[np.uint64], draw: NDArray[np.uint64])
 
 
 def _signals(spec: Spec[Any], joints: bool) -> tuple[Writer, tuple[Signal, ...]]:
-    """Return all signals, or the set-points of joints alone: a co-contraction is kept."""
+    """Return all signals, or the setpoints of joints alone: a co-contraction is kept."""
     if not joints:
         return partial(encode_actions, tuple(spec.actions)), tuple(spec.actions)
     angles = make_joint_signal_map(spec.signals, spec.actions)
@@ -93,7 +93,7 @@ def make_constant(spec: Spec[Any], value: float = -math.inf, joints: bool = Fals
 
 
 def make_random(spec: Spec[Any], joints: bool = False) -> Random:
-    """Return the controller that draws all signals, or the set-points of joints."""
+    """Return the controller that draws all signals, or the setpoints of joints."""
     return Random(*_signals(spec, joints), spec.seed)
 
 

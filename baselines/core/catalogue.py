@@ -1,15 +1,15 @@
 """Catalogue of the classical controllers by name.
 
 Each module of this package that defines controllers holds their entries in ``ENTRIES``, a dict of
-:class:`~baselines.core.entry.Entry` by name; the catalogue collects them. Controllers from outside
+:class:`~baselines.core.entry.Entry` by name; the catalogue collects them. Third-party controllers
 are added by :func:`register`, by :func:`load` from a folder of such modules, or by folders in the
 environment variable ``PAM_ENVS_CONTROLLERS`` (separated as in ``PATH``), which command lines read
 as well.
 
 A controller is built from a nominal plant and the named signals, never from an environment. Its
-model knowledge is part of its result. For "nominal model" the caller provides the model: if it is
+model knowledge is part of its result. For "nominal model" the caller provides the model: if that is
 the simulated plant itself without randomisation, the controller knows the true model, and a table
-of results should say so.
+of results should report it.
 
 Numbers that neither a rule nor a paper fixes are *knobs* (:mod:`baselines.core.knobs`). Names with
 ``_tuned`` are controllers with knobs from a search (:mod:`baselines.core.tuned`).
@@ -34,9 +34,9 @@ from pam_envs.parameters import Signals
 
 VARIABLE = "PAM_ENVS_CONTROLLERS"
 PUBLISHED: dict[str, Entry] = {}
-"""By rule or as published."""
+"""Controllers tuned by rule or as published."""
 CONTROLLERS: dict[str, Entry] = {}
-"""All: also those with knobs from a search."""
+"""All controllers, including those with knobs from a search."""
 
 
 def register(name: str, entry: Entry) -> None:
@@ -100,8 +100,8 @@ def make_controller(
     Raises
     ------
     ValueError
-        If there is no controller of that name, it has no such knob or value, or it is for another
-        class of plants.
+        If the controller does not exist, has no such knob or value, or is for another class of
+        plants.
     """
     entry = CONTROLLERS.get(name)
     if entry is None:

@@ -1,4 +1,4 @@
-"""Check of the policy-predictor contract, for controllers from anywhere."""
+"""Check of the policy-predictor contract, also for third-party controllers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def check_controller(
     action_signals: Signals,
     independent_of_row: bool = True,
 ) -> None:
-    """Raise unless a controller keeps the contract of a policy predictor.
+    """Raise unless a controller satisfies the contract of a policy predictor.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ def check_controller(
     action_signals : Signals
         Those of the environment.
     independent_of_row : bool
-        Whether a row alone gives the answers that it gives in a batch; False for controllers whose
-        random numbers depend on the row.
+        Whether a single row gets the same actions as in a batch; False for controllers whose random
+        numbers depend on the row.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Policy-predictor protocol of controllers, and functions that all of them share.
+"""Policy-predictor protocol of controllers, and their common functions.
 
 A controller is a policy predictor as in stable-baselines3: any object with ``predict``. It runs
 unchanged in ``evaluate_policy``, on one observation of shape (n_obs,) or on a batch of shape
@@ -162,7 +162,7 @@ def encode_actions(
 def reset_rows(
     state: S | None, episode_start: ArrayLike | None, rows: int, initial: Callable[[], S]
 ) -> S:
-    """Return the state with initial values, of all rows, in those that start an episode."""
+    """Return the state, with initial values in the rows that start an episode."""
     if state is None:
         return initial()
     if episode_start is None:
@@ -172,7 +172,7 @@ def reset_rows(
 
 
 def _merged(start: Rows, fresh: S, old: S) -> S:
-    """Return (named) tuples of arrays, or of such tuples: fresh where ``start``, else old."""
+    """Merge (nested, named) tuples of arrays: ``fresh`` in rows with ``start``, else ``old``."""
     if start.all():
         return fresh
     parts = [

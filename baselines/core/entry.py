@@ -1,4 +1,4 @@
-"""Entry of a controller in the catalogue, and the specification that it is designed from."""
+"""Catalogue entry of a controller, and the specification for its design."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Spec(Generic[P]):
     signals, actions : Signals
         Those of the environment.
     knobs : mapping of float
-        Factors on the knobs of the entry; 1 where left out.
+        Factors on the knobs of the entry; 1 if omitted.
     seed : int
         For controllers that draw random numbers.
     """
@@ -61,9 +61,9 @@ class Entry:
     feedback : bool
         Whether it uses measurements beyond the first of an episode.
     citation : str
-        Keys of ``references.bib``, separated by "; "; empty for what needs no source.
+        Keys of ``references.bib``, separated by "; "; empty if no source is needed.
     envs : tuple of str
-        Ids of the environments that it is for.
+        Ids of the environments of the controller.
     plants : tuple of type
         Classes of nominal plants that the maker accepts; empty if the plant is not used.
     seeded : bool
@@ -71,9 +71,9 @@ class Entry:
     kind : str
         "classical": a row of results is verified by running it again.
     tuning : str
-        How its numbers were chosen.
+        Method by which its numbers were chosen.
     trials : int
-        How many settings were tried in simulation to choose them.
+        Number of settings tried in simulation to choose them.
     knobs : mapping
         Lowest and highest factor of each knob; see :mod:`baselines.core.knobs`.
     found : mapping

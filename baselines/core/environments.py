@@ -1,4 +1,4 @@
-"""Environment ids by family, as the entries of the catalogue name them."""
+"""Environment ids by family, for the entries of the catalogue."""
 
 from __future__ import annotations
 

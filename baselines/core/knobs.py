@@ -1,9 +1,9 @@
-"""Knobs: factors on the numbers that a design leaves free.
+"""Knobs: factors on the free parameters of a design.
 
-A rule or a paper fixes most numbers of a controller from the nominal plant, and leaves some open:
-the bandwidth of the closed loop, the lead of the preview. A knob is a factor on one of them; 1 is
-the number as published or by the rule, to the last bit. An entry of the catalogue declares its
-knobs with their bounds (``Entry.knobs``); makers read them by ``Spec.knob``.
+A rule or a paper fixes most parameters of a controller from the nominal plant, and leaves some
+free, such as the bandwidth of the closed loop or the lead of the preview. A knob is a factor on one
+of them; a factor of 1 gives the published or rule-based value to the last bit. An entry of the
+catalogue declares its knobs with their bounds (``Entry.knobs``); makers read them by ``Spec.knob``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Recorded answers of a controller to fixed observations: its identity by behaviour."""
+"""Recorded actions of a controller for fixed observations, which identify it by behaviour."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class RecordedAnswers:
-    """Observations of one episode and the actions that a controller returned to them.
+    """Observations of one episode and the actions that a controller returned for them.
 
     Attributes
     ----------
@@ -29,16 +29,16 @@ class RecordedAnswers:
 
     @classmethod
     def of(cls, controller: Any, observations: Array) -> RecordedAnswers:
-        """Return a controller's answers to observations, given in order from an episode's start."""
+        """Return a controller's actions for observations in order from an episode's start."""
         return cls(observations, answers(controller, observations))
 
     @property
     def travel(self) -> float:
-        """Sum of the absolute changes of the answers."""
+        """Sum of the absolute changes of the actions."""
         return float(np.abs(np.diff(self.answers, axis=0)).sum())
 
     def deviation(self, controller: Any) -> float:
-        """Return the largest deviation of a controller's answers; infinite if not comparable."""
+        """Return the largest deviation of a controller's actions; infinite if not comparable."""
         now = answers(controller, self.observations)
         if now.shape != self.answers.shape or not np.isfinite(now).all():
             return math.inf

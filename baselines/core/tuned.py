@@ -1,8 +1,8 @@
 """Controllers with knobs from a search: reader of ``tuned.yaml``.
 
-The search (``python -m benchmarks tune``) has the number of trials and the tuning seeds of the
-search over a learned controller's settings. Its result holds for one environment, and is an entry
-of its own beside the controller as published.
+The search (``python -m benchmarks tune``) uses the same number of trials and the same tuning seeds
+as the search over a learned controller's settings. Its result is for one environment, and is a
+separate entry beside the controller as published.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def _read(name: str, record: Mapping[str, Any]) -> Tuned:
 
 
 def entries(plain: Mapping[str, Entry], found: Mapping[str, Tuned]) -> dict[str, Entry]:
-    """Return the catalogue entries of tuned controllers; ``plain`` holds them as published."""
+    """Return the catalogue entries of tuned controllers; ``plain`` holds the untuned ones."""
     entries: dict[str, Entry] = {}
     for name, made in found.items():
         base = plain.get(made.controller)

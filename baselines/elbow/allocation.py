@@ -1,12 +1,13 @@
 """Torque and stiffness control of the elbow: exact allocation with friction compensation.
 
 The controller of chakarov2018, Fig. 7: pressures for the reference torque and stiffness at the
-present angle, and a loop around each bundle's pressure. The loss of each bundle's force by friction
-(:mod:`baselines.elbow.nominal`) enters the allocation: the exact inverse of the hysteresis.
+present angle, and a feedback loop for each bundle's pressure. The loss of each bundle's force by
+friction (:mod:`baselines.elbow.nominal`) enters the allocation: the exact inverse of the
+hysteresis.
 
-While a pressure lags, the two pressures together give neither the torque nor the stiffness. With
-``early`` the allocation is restricted to the pressures reachable in the valves' next step, torque
-first, so that the torque holds during the transition.
+While a pressure lags, both torque and stiffness are wrong. With ``early`` the allocation is
+restricted to the pressures reachable in the valves' next step, torque first, so that the torque is
+correct during the transition.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class ElbowAllocation(RowController):
     early: bool
 
     def initial_state(self, observation: ArrayLike) -> RowsState:
-        """Return the hysteresis of bundles that never moved."""
+        """Return the hysteresis state of bundles without motion history."""
         return self.friction.hysteresis.initial(row_count(observation))
 
     def respond(self, observation: ArrayLike, state: RowsState) -> Prediction:

@@ -1,11 +1,11 @@
 """Nominal elbow orthosis: friction of the bundles, and pressures for torque and stiffness.
 
-Friction inside the bundles is driven by their contraction, and so by the sensed angle: a nominal
-hysteresis driven by it gives the additional pull in one direction and the loss in the other.
+Friction inside the bundles depends on their contraction, and thus on the sensed angle. A nominal
+hysteresis of the angle gives the additional pull in one direction and the loss in the other.
 
 chakarov2018 finds the pressures by an optimisation. Torque and stiffness are linear in both
-pressures, so that two linear equations give them exactly; references out of reach keep the torque
-first, and the stiffness as near as possible (:mod:`pam_envs.mechanics`).
+pressures, so that two linear equations give them exactly. For references out of reach the torque
+has priority, and the stiffness is as near as possible (:mod:`pam_envs.mechanics`).
 """
 
 from __future__ import annotations
@@ -57,8 +57,9 @@ def pressures_for(
 ) -> tuple[Array, Array]:
     """Return the pressures [Pa] of bundles a and b of a nominal orthosis, shape (n_env,).
 
-    For references at an angle, SI, with losses of the bundles' shapes [m^2] by friction. The limits
-    are the lowest and highest pressures [Pa], shapes (2, n_env); default: the whole range.
+    References and angle are in SI; ``losses`` are the friction losses of the bundles' shapes [m^2].
+    The limits are the lowest and highest pressures [Pa], shapes (2, n_env); default: the whole
+    range.
     """
     full = plant.full_pressure
     phi_a, phi_b, psi_a, psi_b = (np.ravel(x) for x in plant.geometry(angle))

@@ -1,14 +1,14 @@
 """Inner pressure loops of the elbow: from reference pressures to valve commands.
 
-Regulators lag: the set-point leads the reference by a multiple of the remaining pressure error, so
+Regulators lag: the setpoint leads the reference by a multiple of the remaining pressure error, so
 that the loop takes ``LOOP_PERIODS`` control periods.
 
-On/off valves accept one pulse in a cycle. Its width supplies or removes the mass of air missing at
-the end of the cycle (the volume then, at the present rate of the elbow, times the reference
-pressure, less the air inside) over the flow through the valve at the mean pressure; longer by the
-opening time and shorter by the closing time. No pulse is given where the shortest one would
-overshoot by more than the present error, or where the error is not resolved by the sensors, unless
-it is half of the effect of a whole cycle: near empty, air leaves slowly.
+On/off valves accept one pulse per cycle. Its width is the missing mass of air over the flow through
+the valve at the mean pressure, longer by the opening time and shorter by the closing time. The
+missing mass is that for the reference pressure in the volume at the end of the cycle (at the
+present rate of the elbow), less the air inside. No pulse is given if the shortest one would
+overshoot by more than the present error, or if the sensors do not resolve the error, unless the
+error is at least half of the effect of a whole cycle: near empty, air leaves slowly.
 
 Each loop also gives the limits of the pressures at the end of its next step.
 """
@@ -51,7 +51,7 @@ class RegulatorLoop:
         return LOOP_PERIODS * self.plant.control_period
 
     def commands(self, view: ElbowView, reference: Array) -> Array:
-        """Return set-points [Pa]."""
+        """Return setpoints [Pa]."""
         lead = max(1.0, self.plant.regulator.time_constant / self._time)
         return view.pressure + lead * (reference - view.pressure)
 
@@ -92,9 +92,9 @@ class PulseLoop:
         return np.maximum(low, 0.0), np.clip(high, 0.0, plant.full_pressure)
 
     def _closed(self, view: ElbowView) -> tuple[Array, Array, Array]:
-        """Return air inside [kg], pressure without a pulse [Pa], and pressure per air [Pa/kg].
+        """Return air inside [kg], pressure without a pulse [Pa], and pressure per air mass [Pa/kg].
 
-        After a cycle; all of shape (2, n_env).
+        The pressures are those at the end of the cycle; all of shape (2, n_env).
         """
         plant = self.plant
         then = np.clip(view.angle + plant.cycle * view.rate, *plant.angle_range)
@@ -135,7 +135,7 @@ class PulseLoop:
 
 @dataclass(frozen=True)
 class ScaledLoop:
-    """An inner loop with factors on the reference's distance from the sensed pressure, and reach.
+    """An inner loop with factors on the pressure error and on the reachable limits.
 
     ``full`` is the largest pressure [Pa].
     """

@@ -1,7 +1,7 @@
-"""Parts that all controllers of joints share: model, signals, gravity feedforward and preview.
+"""Common parts of the controllers of joints: model, signals, gravity feedforward and preview.
 
-With preview, a controller reads the reference later by its own delay for slow references and half a
-control period of the hold, by linear interpolation of the previewed samples. Where the preview
+With preview, a controller reads the reference ahead by its own delay for slow references plus half
+a control period of the hold, by linear interpolation of the previewed samples. If the preview
 horizon is too short, as for the slow joints of an arm, the line from the present to the last sample
 is extrapolated.
 
@@ -11,12 +11,12 @@ damping of ``1 / sqrt(2)``,
     T(s) = 1 / (1 + 2 (s / p) + 2 (s / p)^2)
 
 which equals ``exp(-2 s / p)`` up to the third order: for a smooth reference a pure delay of
-``2 / p``. (The double pole without a loop has the same delay, up to the second order.)
+``2 / p``. (The double pole without feedback has the same delay, up to the second order.)
 
-The gravity feedforward changes the set-points such that they compensate the weight of links and
-payload of the nominal plant: the torque of the weight at the reference angles, and the set-point at
+The gravity feedforward changes the setpoints such that they compensate the weight of links and
+payload of the nominal plant: the torque of the weight at the reference angles, and the setpoint at
 which the muscles exert that torque there. In a manipulator the torque depends on the angles of all
-joints. Reference angles are used instead of sensed ones, which would be a feedback.
+joints. Reference angles are used instead of sensed ones, which would introduce feedback.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ LARGEST_TORQUE = 8.0
 
 
 def double_pole_delays(poles: Sequence[float]) -> list[float]:
-    """Return the delays [s] of double poles [rad/s], and of the PI's loops around them."""
+    """Return the delay [s] of double poles [rad/s], with or without the PI's feedback."""
     return [2.0 / pole for pole in poles]
 
 
@@ -112,7 +112,7 @@ class JointController(RowController):
     parts: Parts
 
     def start(self, observation: ArrayLike) -> tuple[JointView, Array]:
-        """Return an episode's first view, and its set-points [rad] without gravity feedforward."""
+        """Return an episode's first view, and its setpoints [rad] without gravity feedforward."""
         view = self.parts.signals.read(observation)
         return view, view.set_point - self.parts.gravity.shift(view.angle, view.payload)
 
@@ -128,8 +128,8 @@ def make_parts(
 ) -> Parts:
     """Return the parts of a controller.
 
-    ``gravity``: whether the set-points compensate the weight of the links and of the declared
-    payload; ``delays`` [s], without that of the hold, are previewed, None for no preview.
+    ``gravity``: whether the setpoints compensate the weight of the links and of the declared
+    payload. The preview compensates ``delays`` [s], which exclude the hold; None for no preview.
     """
     signals = make_joint_signal_map(spec.signals, spec.actions)
     leads = (

@@ -93,7 +93,7 @@ def reference_filter(law: Simc) -> StateSpace:
 def pid_delay(law: Simc, gain: float) -> float:
     """Return the delay [s] of the PID's closed loop for slow references.
 
-    The sum of the ramp error ``tau_I / (K_c K)`` and the lag of the reference filter.
+    It is the sum of the ramp error ``tau_I / (K_c K)`` and the lag of the reference filter.
     """
     ramp = law.integral_time / (law.gain * gain)
     return ramp + law.derivative_time * (1.0 - 1.0 / FILTER)
@@ -108,13 +108,13 @@ class FeedbackState(NamedTuple):
 
 @dataclass(frozen=True)
 class JointFeedback(JointController):
-    """A loop for every joint, behind a filter of the reference."""
+    """A feedback loop for every joint, after a reference filter."""
 
     loop: Bumpless
     prefilter: DiscreteSystem
 
     def initial_state(self, observation: ArrayLike) -> FeedbackState:
-        """Return the state that holds the present set-point."""
+        """Return the state that holds the present setpoint."""
         view, held = self.start(observation)
         return FeedbackState(self.loop.holding_state(held), self.prefilter.rest_state(view.angle))
 
@@ -133,7 +133,7 @@ class JointFeedback(JointController):
 def make_joint_feedback(
     spec: Spec[Any], kind: Kind = "pi", gravity: bool = False, ahead: bool = False
 ) -> JointFeedback:
-    """Return the controller, with or without gravity feedforward and preview of its own delay."""
+    """Return the controller, optionally with gravity feedforward and preview of its own delay."""
     plant = spec.plant
     model = joint_model(plant, joint_poles(plant)).narrowed(0.0)
     loops = _loops(model, kind, plant.stages > 1, spec.knobs)

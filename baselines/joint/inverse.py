@@ -29,7 +29,7 @@ class JointInverse(JointController):
     """Inverse of the hysteresis as feedforward."""
 
     def initial_state(self, observation: ArrayLike) -> RowsState:
-        """Return the hysteresis after the present set-point."""
+        """Return the hysteresis state after the present setpoint."""
         return self.parts.model.start(self.start(observation)[1])[1]
 
     def respond(self, observation: ArrayLike, state: RowsState) -> Prediction:
@@ -45,8 +45,8 @@ def make_joint_inverse(
 ) -> JointInverse:
     """Return the controller, with or without gravity feedforward and preview of the joints' delays.
 
-    ``inverse`` is the width of the inverted hysteresis over the identified one; 0: the line between
-    the tips of the loop.
+    ``inverse`` scales the width of the inverted hysteresis; 0: the line between the tips of the
+    loop.
     """
     delays = joint_delays(spec.plant) if ahead else None
     return JointInverse(

@@ -1,9 +1,9 @@
-"""Linear feedback of the joints' angles, with a model of the motion against windup.
+"""Linear feedback of the joints' angles, with anti-windup by a model of the motion.
 
-Beside every controller runs a model of the motion on the difference between the applied command
-and the controller's own (:mod:`baselines.linear.bumpless` with gains of 0): the controller sees the
-angle that its own command would have given. It does not wind up at a limit, and an episode starts
-from the command at hand.
+A model of the motion runs beside every controller, driven by the difference between the applied
+command and the controller's own (:mod:`baselines.linear.bumpless` with gains of 0). The controller
+thus sees the angle that its own command would have given: it does not wind up at a limit, and an
+episode starts from the present command.
 
 The PI of fluidic_muscles (section 4) puts its zero on one of the two poles ``p`` of the nominal
 plant ``K p^2 / (s + p)^2``, so that the loop is ``K_p K p^2 / (s (s + p))``, and takes the gain
@@ -12,15 +12,15 @@ they are 0.5 and 11.5 1/s. The slow PI cancels the pole too, with the crossover 
 disturbance loop, ``K_i K = 4 rad/s`` (in proportion to ``p`` for other poles).
 
 The model loop of model-following control is computed and not measured: it runs in continuous time,
-with the reference held over a period, and its mean command over the period is applied. The model of
-the joint is driven by that mean, as the joint is, so that both differ by the model error alone.
+with the reference held over a period, and its mean command over the period is applied. Joint and
+model of the joint both receive that mean, so that they differ only by the model error.
 
-A PI in feedback has the samples only: by the bilinear rule at 10 ms it overshoots by 6.1 % in place
+A PI in feedback has only the samples: by the bilinear rule at 10 ms it overshoots by 6.1 % instead
 of 4.3 % on the nominal plant. A comparison of the two includes the effect of sampling; to exclude
-it, run the single PI at 1 ms, where it is as good as continuous.
+it, run the single PI at 1 ms, which is practically continuous.
 
-Limits act behind the model loop, on the command: the loop continues unlimited, and the model behind
-it, which receives the limited command, lags. Nothing winds up.
+Limits act on the command after the model loop: the loop itself is unlimited, and the subsequent
+model, which receives the limited command, lags. Nothing winds up.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def make_loop(model: JointModel, controller: Callable[[float], StateSpace]) -> B
 
 
 def make_model_loop(model: JointModel, damping: float = DAMPING) -> DiscreteSystem:
-    """Return the loops of PI and model for each joint, from reference to mean command."""
+    """Return the closed loops of PI and model for each joint, from reference to mean command."""
     loops = []
     for pole in model.poles:
         pi = pi_system(pole_cancelling(pole=pole, damping=damping))

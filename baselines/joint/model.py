@@ -2,8 +2,8 @@
 
 The hysteresis is identified on the nominal plant as in fluidic_muscles (section 3.2) on the rig, by
 first-order descending curves (:mod:`pam_envs.identification.joint_forc`), and made symmetric. The
-motion behind it is the paper's nominal model (section 4), two real poles at 23 rad/s. For a
-manipulator it is one stage, without the others.
+motion after it is the paper's nominal model (section 4), two real poles at 23 rad/s. For a
+manipulator the hysteresis is that of a single stage.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ _HYSTERESIS_MODELS: dict[str, Preisach] = {}
 class JointModel:
     """Nominal model of joints.
 
-    From set-points between ``low`` and ``high`` [rad] to angles at rest [rad], by the hysteresis or
-    by a line with a slope; then the double pole of each joint [rad/s]. Control period in s.
+    Hysteresis, or a line with a slope, maps setpoints between ``low`` and ``high`` [rad] to angles
+    at rest [rad]; the double pole of each joint [rad/s] follows. Control period in s.
     """
 
     hysteresis: Preisach | None
@@ -52,7 +52,7 @@ class JointModel:
 
     @cached_property
     def gain(self) -> float:
-        """Angle over set-point between the tips of the major loop: the nominal gain ``K``."""
+        """Angle over setpoint between the tips of the major loop: the nominal gain ``K``."""
         if self.hysteresis is None:
             return self.slope
         return float(self.hysteresis.everett[-1, 0]) / (self.hysteresis.high - self.hysteresis.low)
@@ -64,7 +64,7 @@ class JointModel:
 
     @cached_property
     def reach(self) -> tuple[float, float]:
-        """Angles at rest [rad] at the ends of the set-point's range, reached from the other end."""
+        """Angles at rest [rad] at the ends of the setpoint's range, reached from the other end."""
         ends = np.array([self.low, self.high])
         state = self.rows.initial(2)
         for u in (ends[::-1], ends):
@@ -72,15 +72,15 @@ class JointModel:
         return float(found[0]), float(found[1])
 
     def start(self, set_point: Array) -> tuple[Array, RowsState]:
-        """Return angles at rest under first set-points (n_env, n_joints) [rad], and the state."""
+        """Return angles at rest under first setpoints (n_env, n_joints) [rad], and the state."""
         return self._forward(set_point, self.rows.initial(set_point.size))
 
     def forward(self, set_point: Array, state: RowsState) -> tuple[Array, RowsState]:
-        """Return the angles at rest [rad] under set-points, and the state after them."""
+        """Return the angles at rest [rad] under setpoints, and the state after them."""
         return self._forward(set_point, _flat(state))
 
     def inverse(self, angle: Array, state: RowsState) -> Array:
-        """Return the set-points [rad] of angles at rest; the state is unchanged."""
+        """Return the setpoints [rad] of angles at rest; the state is unchanged."""
         return self.rows.inverse(angle.ravel() / self.slope, _flat(state)).reshape(angle.shape)
 
     def _forward(self, set_point: Array, state: RowsState) -> tuple[Array, RowsState]:

@@ -7,9 +7,9 @@ fluidic_muscles, section 4, Fig. 11:
     command            u = H^-1(u_mod + u_dis)         (+ gravity feedforward)
 
 The model loop has no disturbance: its PI (pole cancellation, ``D = 1/sqrt(2)``) is designed for
-tracking alone. The disturbance loop compares the joint with the model instead of the reference, and
-is designed for rejection alone (:mod:`baselines.robust.loops`). With an exact inverse and motion
-the joint equals its model, and the disturbance loop is at rest.
+tracking only. The disturbance loop compares the joint with the model instead of the reference, and
+is designed for disturbance rejection only (:mod:`baselines.robust.loops`). With an exact inverse
+and an exact model of the motion the joint equals its model, and the disturbance loop is at rest.
 
 ``H^-1`` is the exact recursive inverse of the identified hysteresis (:mod:`baselines.joint.model`),
 for the history of commands; without it ``u = (u_mod + u_dis) / K``. ``u_mod`` is limited to the
@@ -65,7 +65,7 @@ class ModelFollowing(JointController):
     disturbance: Bumpless
 
     def initial_state(self, observation: ArrayLike) -> FollowingState:
-        """Return the state of joints at rest at the present angle and set-point."""
+        """Return the state of joints at rest at the present angle and setpoint."""
         (view, without), model = self.start(observation), self.parts.model
         held, hysteresis = model.start(without)
         return FollowingState(
@@ -95,7 +95,7 @@ class ModelFollowing(JointController):
         return self.parts.signals.write(set_point, observation), after
 
     def model_output(self, state: FollowingState) -> Array:
-        """Return the model's angles [rad], shape (n_env, n_joints), when the action has acted."""
+        """Return the model's angles [rad] at the end of the period, shape (n_env, n_joints)."""
         return self.parts.model.motion.output(np.zeros(state.model.shape[:-1]), state.model)
 
 
@@ -108,9 +108,9 @@ def make_model_following(
 ) -> ModelFollowing:
     """Return the controller, with or without gravity feedforward and preview.
 
-    ``kind`` is that of the disturbance loop; ``inverse`` the width of the inverted hysteresis over
-    the identified one: 1 is the exact inverse, 0 none. The delay of the model loop is proportional
-    to the square of its damping.
+    ``kind`` selects the disturbance loop; ``inverse`` scales the width of the inverted hysteresis:
+    1 is the exact inverse, 0 none. The delay of the model loop is proportional to the square of its
+    damping.
     """
     model = joint_model(spec.plant, joint_poles(spec.plant)).narrowed(inverse)
     damping, pace = spec.knob("damping"), spec.knob("disturbance")

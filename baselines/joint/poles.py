@@ -1,9 +1,9 @@
 """Equivalent double pole and delay of each joint of a nominal plant.
 
 A single stage is the paper's nominal model, two poles at 23 rad/s. In an arm a joint also moves the
-links behind it: its pole is the frequency at which its angle lags its own set-point by 90 degrees,
+distal links: its pole is the frequency at which its angle lags its own setpoint by 90 degrees,
 as ``p^2 / (s + p)^2`` does at ``p`` (and an oscillating joint at its natural frequency), at most
-that of a single stage. Its delay for slow set-points is the mean time of its impulse response,
+that of a single stage. Its delay for slow setpoints is the mean time of its impulse response,
 ``2 / p`` for a double pole and less for an oscillating joint. Both are found by small steps of one
 joint at a time, with the arm straight and without hysteresis.
 """
@@ -40,7 +40,7 @@ def joint_poles(plant: Any) -> tuple[float, ...]:
 
 
 def joint_delays(plant: Any) -> tuple[float, ...]:
-    """Return the delay of each joint [s] for slow set-points, without the hold."""
+    """Return the delay of each joint [s] for slow setpoints, without the hold."""
     return tuple(pace.delay for pace in joint_dynamics(plant))
 
 

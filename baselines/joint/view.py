@@ -20,7 +20,7 @@ from pam_envs.parameters import Signal, Signals
 class JointView(NamedTuple):
     """One observation, arrays of shape (n_env, n_joints), angles in rad.
 
-    Sensed angle, set-point of the last period, samples of the reference, present and previewed, of
+    Sensed angle, setpoint of the last period, samples of the reference, present and previewed, of
     shape (n_env, n_joints, n_samples), and declared payload [kg] of shape (n_env,), or 0.
     """
 
@@ -63,7 +63,7 @@ class JointSignalMap:
         return JointView(angle, set_point, samples, payload)
 
     def write(self, set_points: Array, observation: ArrayLike) -> NDArray[np.float32]:
-        """Return the action for set-points [rad], shape (n_env, n_joints)."""
+        """Return the action for setpoints [rad], shape (n_env, n_joints)."""
         signal = self.prestress_action
         if signal is None:
             return encode_actions(self.actions, set_points.T, observation)

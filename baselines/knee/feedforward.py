@@ -1,10 +1,10 @@
-"""Feedforward control of the knee: from a reference tension to a pressure.
+"""Feedforward control of the knee from a reference tension to a pressure.
 
 The reference tension over the measured stretch of the muscle is the reference stiffness (yeh2010,
 section 4.1). Its pressure comes from the inverse of the identified hysteresis ("inverse"), from the
 straight line between the tips of its loop ("line"), or is the nominal pressure ("nominal"). The
 inverse is static, as in yeh2010, without the regulator's lag; with a preview it tracks the
-reference stiffness of one lag later.
+reference stiffness one lag ahead.
 
 In stance, and with the brace alone, the reference tension is tracked; in swing the tension cancels
 the wire's torque on the knee.
@@ -46,8 +46,8 @@ KNOBS: Bounds = {"lead": (0.25, 4.0)}
 class StiffnessPreview:
     """Interpolation of the previewed reference stiffness [N/m] at a later time.
 
-    Readers of the references and their previews, the angle's with a gait alone, and weights of
-    their samples.
+    It holds readers of the references with their previews (of the angle only in gait environments),
+    and the weights of their samples.
     """
 
     observer: KneeObserver
@@ -135,7 +135,7 @@ class KneeForward(RowController):
     assist: bool
 
     def initial_state(self, observation: ArrayLike) -> RowsState:
-        """Return the state after inflation to the present set-point."""
+        """Return the state after inflation to the present setpoint."""
         return self.forward.start(self.forward.observer.read(observation).set_point)
 
     def respond(self, observation: ArrayLike, state: RowsState) -> Prediction:

@@ -1,14 +1,14 @@
-"""Frequency response tests of a nominal knee orthosis: yeh2010, section 4.1.
+"""Frequency-response tests of a nominal knee orthosis (yeh2010, section 4.1).
 
-The set-point oscillates about 2 bar, one sine a run, and tension or angle is measured. The mounting
-of the orthosis in the test is part of the identified plant:
+The setpoint oscillates about 2 bar, one sine per run, and tension or angle is measured. The
+mounting of the orthosis in the test is part of the identified plant:
 
 - tension of the brace alone: free to move, as in the paper;
 - tension in a rig or on a leg: at the nominal length, as held by a leg that bears weight;
 - angle on a leg: with the inertia, damping and hold of a hanging leg.
 
-The paper's tests are all without a leg: its angle controller would meet 25 times the inertia of its
-design.
+All of the paper's tests are without a leg: its angle controller would face 25 times the inertia of
+its design.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ Output = Literal["tension", "angle"]
 CENTRE = 2e5
 """Mean pressure [Pa] of the sines."""
 AMPLITUDE = 0.5e5
-"""[Pa]; a smaller amplitude is attenuated by the muscle's friction."""
+"""Amplitude [Pa]; a smaller one is attenuated by the muscle's friction."""
 FREQUENCIES = np.geomspace(0.5, 60.0, 24)
 """[rad/s]."""
 SETTLING, MEASURED = 4.0, 26.0
-"""Duration [s] before and of a measurement, rounded to whole periods of each sine."""
+"""Settling and measurement time [s], rounded to whole periods of each sine."""
 ORDERS: dict[tuple[str, str, str], tuple[int, int]] = {
     ("no_load", "tension", "lag"): (3, 2),
     ("rig", "tension", "lag"): (1, 1),
@@ -60,7 +60,7 @@ def tested(plant: KneeOrthosis, output: Output) -> KneeOrthosis:
     stiffness = lever.stiffness + held
     hanging = quiet.replace(
         {
-            "lever.inertia": leg.inertia,  # the brace has 4 % of it
+            "lever.inertia": leg.inertia,  # the inertia of the brace is 4 % of it
             "lever.damping": lever.damping + leg.damping + leg.hold_damping,
             "lever.stiffness": stiffness,
             "lever.relaxed_angle": angle
@@ -73,7 +73,7 @@ def tested(plant: KneeOrthosis, output: Output) -> KneeOrthosis:
 def frequency_response(
     plant: KneeOrthosis, output: Output, frequencies: Array = FREQUENCIES
 ) -> NDArray[np.complex128]:
-    """Return the response from pressure set-point [kPa] to an output, one sine a run.
+    """Return the response from pressure setpoint [kPa] to an output, one sine per run.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ _FITS: dict[tuple[str, str], RationalFit] = {}
 
 
 def identify(plant: KneeOrthosis, output: Output) -> RationalFit:
-    """Return the transfer function from set-point [kPa] to tension [N] or angle [rad].
+    """Return the transfer function from setpoint [kPa] to tension [N] or angle [rad].
 
     Cached by plant.
     """

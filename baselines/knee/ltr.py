@@ -1,14 +1,14 @@
-"""Feedback of tension in stance and of angle in swing, with a feedforward: yeh2010, section 4.
+"""Feedback of tension in stance and of angle in swing, with a feedforward (yeh2010, section 4).
 
-    stance   set-point = forward(T_d) + K_T (T_d - T)
-    swing    set-point = forward(T_0) + K_theta (theta_d - theta)
+    stance   setpoint = forward(T_d) + K_T (T_d - T)
+    swing    setpoint = forward(T_0) + K_theta (theta_d - theta)
 
 ``T_d`` is the reference tension, ``T_0`` the tension of zero wire torque on the knee. Both
-controllers always run; the sensed load of the heel selects which is applied. The controller
-off-line receives the references of the environment (in swing a tension that may have an offset, in
-stance the angle itself). With compensators each controller receives the applied command; without
-them it integrates an error that it cannot change, and the controller in charge is clamped, so that
-both forms differ in the transfer alone. With the brace alone it is always stance.
+controllers always run; the sensed load of the heel selects the active one. The off-line controller
+receives the references of the environment (in swing a tension that may have an offset, in stance
+the angle itself). With compensators each controller receives the applied command. Without them the
+off-line controller integrates an error that it cannot affect, and the active one is clamped, so
+that both forms differ only in the transfer. The brace alone is always in stance.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 
 class LtrState(NamedTuple):
-    """States of both controllers, no angle without a gait, and of the feedforward's hysteresis."""
+    """States of the controllers (without a gait: tension only) and the feedforward's hysteresis."""
 
     tension: BumplessState
     angle: BumplessState | tuple[()]
@@ -50,7 +50,7 @@ class KneeLtr(RowController):
     action_signal: Signal
 
     def initial_state(self, observation: ArrayLike) -> LtrState:
-        """Return the state at rest, or holding the present set-point."""
+        """Return the state at rest, or holding the present setpoint."""
         view = self.forward.observer.read(observation)
         held = np.zeros_like(view.set_point)
         if self.forward.kind == "nominal":
@@ -85,7 +85,7 @@ class KneeLtr(RowController):
         forward: Array,
         state: BumplessState,
     ) -> Array:
-        """Return a loop's share of the set-point [Pa], within the range left by the feedforward."""
+        """Return a loop's share of the setpoint [Pa], within the range left by the feedforward."""
         low, high = self.action_signal.low - forward, self.action_signal.high - forward
         return loop.output(reference, measured, state, low, high)
 
@@ -99,9 +99,9 @@ def make_knee_ltr(
 ) -> KneeLtr:
     """Return the controller.
 
-    ``bumpless``: whether the compensators act; ``printed``: whether the tension controller is the
-    printed one; ``preview``: whether the feedforward is previewed by one lag. The knobs of
-    :data:`baselines.knee.design.KNOBS` are for the tension loop alone.
+    ``bumpless``: whether the compensators are active; ``printed``: whether the tension controller
+    is the printed one; ``preview``: whether the feedforward is previewed by one lag. The knobs of
+    :data:`baselines.knee.design.KNOBS` are for the tension loop only.
     """
     plant, ahead = spec.plant, make_forward(spec, forward, preview)
     return KneeLtr(

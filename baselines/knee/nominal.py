@@ -15,7 +15,7 @@ from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 SHORTEST_STRETCH = 1e-3
-"""Lower bound [m] of the stretch that tensions are divided by."""
+"""Lower bound [m] of the stretch, the divisor of tensions."""
 CURVE_POINTS = 451
 
 
@@ -71,14 +71,14 @@ class KneeNominal:
         return self.hysteresis.forward(pressure, state)[1]
 
     def pressure_for(self, stiffness: Array, state: RowsState) -> Array:
-        """Return the pressure [Pa], within the capacity, of a stiffness [N/m] after a history."""
+        """Return the pressure [Pa], within the capacity, for a stiffness [N/m] after a history."""
         found = self.hysteresis.inverse(stiffness / self._per_output, state)
         return np.minimum(np.maximum(found, 0.0), self.full_pressure)
 
     def tension_at_rest(self, pressure: Array) -> Array:
         """Return the tension [N] at rest without hysteresis: held in a rig, or free to move.
 
-        On a leg it is that of the rig: a leg that bears weight holds the muscle's length.
+        On a leg it equals that of the rig: a leg that bears weight holds the muscle's length.
         """
         stiffness = pressure * (self._full_stiffness / self.full_pressure)
         if self.plant.mounting == "no_load":
@@ -89,7 +89,7 @@ class KneeNominal:
 
     @cached_property
     def _balance(self) -> tuple[Array, Array]:
-        """Tensions [N] at rest, rising, and the angles [rad] of the brace alone."""
+        """Tensions [N] at rest in increasing order, and the angles [rad] of the brace alone."""
         stiffness = np.linspace(0.0, 1.2 * self._full_stiffness, CURVE_POINTS)
         angle = self.plant.angle_at(stiffness)
         return stiffness * self.stretch(angle), angle
@@ -103,6 +103,6 @@ class KneeNominal:
 
     @cached_property
     def steepest_gain(self) -> float:
-        """Largest tension per pressure [N/Pa] at rest, from a tenth of the capacity on."""
+        """Largest static gain [N/Pa] from pressure to tension, above a tenth of the capacity."""
         pressure = np.linspace(0.1 * self.full_pressure, self.full_pressure, CURVE_POINTS)
         return float(np.max(np.diff(self.tension_at_rest(pressure)) / np.diff(pressure)))

@@ -3,9 +3,9 @@
 Tuning: :mod:`baselines.linear.pid` for a lag with dead time and ``tau_c = theta``, with K the
 steepest static tension per pressure of the nominal orthosis. For a regulator with lag, tau_1 is its
 time constant and theta one and a half control periods. For the published dynamics, whose 0.3 s are
-distributed over seven poles, the half rule gives half of their sum to each.
+distributed over seven poles, the half rule assigns half of their sum to each of the two.
 
-The reference tension is tracked in stance and in swing: there is no second controller.
+The reference tension is tracked in stance and in swing; there is no second controller.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Observation of the knee's controllers: named signals as tensions and angles.
+"""Observation of the knee's controllers: tensions and angles from named signals.
 
 The environments of the brace alone track a tension or a stiffness, those of the gait a tension in
 stance and an angle in swing. The names and units of the signals determine which. A reference
@@ -25,7 +25,7 @@ GAIT_NAMES = ("stance", "angle_reference")
 class KneeView(NamedTuple):
     """One observation of every row in SI, arrays of shape (n_env,).
 
-    Sensed tension and angle, the set-point of the last period, the reference tension (in swing that
+    Sensed tension and angle, the setpoint of the last period, the reference tension (in swing that
     of the tension controller off-line), the muscle's length above its shortest, rows in stance, and
     the reference angle of the swing. Without a gait all rows are in stance, with the sensed angle.
     """
@@ -43,7 +43,8 @@ class KneeView(NamedTuple):
 class KneeObserver:
     """Reader of observations as a :class:`KneeView`.
 
-    ``gait``: whether there is stance and swing; ``stiffness``: whether the reference is one.
+    ``gait``: whether there is stance and swing; ``stiffness``: whether the reference is a
+    stiffness.
     """
 
     nominal: KneeNominal

@@ -1,23 +1,23 @@
-"""Bumpless transfer and anti-windup by a model of the plant beside each controller.
+"""Bumpless transfer and anti-windup by a parallel plant model for each controller.
 
-A controller off-line would integrate an error that it cannot change. Its compensator runs the model
-of the plant on the difference between the applied command ``u`` and the controller's own output
-``u_c``:
+An off-line controller would integrate an error that it cannot affect. Its compensator runs a model
+of the plant, driven by the difference between the applied command ``u`` and the controller's own
+output ``u_c``:
 
     dxi/dt = A xi + B (u - u_c),   v_1 = K xi + L (u - u_c),   v_2 = C xi
 
 ``v_2`` is subtracted from the measurement: the controller sees the output that its own command
 would have given, a fictitious loop that stays settled on the reference. ``v_1`` is added to its
-output, so that in charge ``u = sat(u_c + v_1)``. The same holds while the command is limited. With
-one input the algebraic loop through ``L`` has the solution ``u = sat(u_c + F xi)`` with
-``F = K / (1 - L)``: apart from this factor ``L`` has no effect.
+output, so that the active controller gives ``u = sat(u_c + v_1)``. The same applies while the
+command is limited. With one input the algebraic loop through ``L`` has the solution
+``u = sat(u_c + F xi)`` with ``F = K / (1 - L)``: apart from this factor ``L`` has no effect.
 
 The gains follow from a linear matrix inequality, the circle criterion for the saturation. With
 ``Q, U > 0``, ``X1 = F Q``, ``X2 = E U``, ``L = E / (1 + E)``, ``K = F (1 - L)``,
 
     [A Q + Q A' + B X1 + X1' B' + 2 alpha Q,  -B (U + X2) + X1'; *,  -2 (U + X2)] < 0
 
-guarantees that ``xi`` decays at the rate ``alpha`` at least. No ``alpha`` above the decay rate of
+guarantees that ``xi`` decays at least at the rate ``alpha``. No ``alpha`` above the decay rate of
 the slowest pole of the plant is feasible. Only ``U + X2`` enters: ``L`` may be any number below 1.
 The chosen ``F`` has the largest distance from the bound, less a small penalty on its size: for a
 stable, well-damped plant it is close to 0, which satisfies the inequality as well.
@@ -44,9 +44,9 @@ from baselines.linear.systems import DiscreteSystem, StateSpace, discrete, time_
 SMALLEST = 1e-7
 """Distance from the inequality's bound that counts as feasible."""
 PENALTY = 1e-2
-"""Distance from the bound that a unit of state feedback has to gain."""
+"""Penalty of the distance from the bound per unit of state feedback."""
 ROUNDING = 1e-12
-"""Difference between own and applied command that counts as rounding, over the range."""
+"""Difference of own and applied command that counts as rounding, relative to the range."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class BumplessGains:
 
 
 class BumplessState(NamedTuple):
-    """States of a controller and of the model beside it, ``xi``, shapes (..., *lanes, n)."""
+    """States of a controller and of its plant model, ``xi``, shapes (..., *lanes, n)."""
 
     controller: Array
     model: Array
@@ -78,9 +78,9 @@ class BumplessState(NamedTuple):
 
 @dataclass(frozen=True)
 class Bumpless:
-    """A linear controller for bumpless transfer and limited commands.
+    """A linear controller with bumpless transfer and anti-windup.
 
-    At every control instant apply :meth:`output` of the controller in charge, and :meth:`advance`
+    At every control instant apply :meth:`output` of the active controller, and :meth:`advance`
     *every* controller with the applied command.
 
     Attributes
@@ -88,9 +88,9 @@ class Bumpless:
     controller, model : DiscreteSystem
         From reference less measurement to command; the plant at the same period, strictly proper.
     compensated : bool
-        Whether the compensator acts. Without it the controller sees the measurement itself, and in
-        charge it clamps against windup: an error that would drive a limited command further is
-        taken as 0. Both forms then differ in the transfer alone.
+        Whether the compensator is active. Without it the controller sees the measurement itself,
+        and when active it clamps against windup: an error that would drive a limited command
+        further is replaced by 0. Both forms then differ only in the transfer.
     """
 
     controller: DiscreteSystem
@@ -110,7 +110,7 @@ class Bumpless:
             raise ValueError(f"low is {self.low} and high {self.high}; low must be below: swap")
 
     def without(self) -> Bumpless:
-        """Return this controller without its compensator, with clamping in its place."""
+        """Return this controller with clamping instead of its compensator."""
         return replace(self, compensated=False)
 
     def initial_state(self, rows: int | tuple[int, ...] = ()) -> BumplessState:
@@ -130,9 +130,9 @@ class Bumpless:
         low: ArrayLike | None = None,
         high: ArrayLike | None = None,
     ) -> Array:
-        """Return the command of a controller in charge, shape (..., *lanes), within the limits.
+        """Return the command of the active controller, shape (..., *lanes), within the limits.
 
-        ``low`` and ``high`` are limits at this instant, where a feedforward takes a part.
+        ``low`` and ``high`` are limits at this instant, if a feedforward uses part of the range.
         """
         command = self.controller.output(self._error(reference, measured, state), state.controller)
         if self.compensated:
@@ -151,8 +151,8 @@ class Bumpless:
         """Return the state after a period with the command ``applied``, shape (..., *lanes).
 
         With a feedforward behind this controller, ``applied`` is the applied command less this
-        controller's own feedforward. ``in_charge``, shape (...), marks rows in which the command
-        was its own; it matters for clamping, without the compensator, alone.
+        controller's own feedforward. ``in_charge``, shape (...), marks rows in which this
+        controller was active; it is used only for clamping, without the compensator.
         """
         error = self._error(reference, measured, state)
         own, after = self.controller.step(error, state.controller)
@@ -224,7 +224,7 @@ def design_bumpless(plant: StateSpace, decay: float = 0.0) -> BumplessGains:
 def certificate(plant: StateSpace, gains: BumplessGains, decay: float = 0.0) -> float:
     """Return the distance of gains from the inequality's bound: above 0 if they satisfy it.
 
-    Largest distance of the eigenvalues from 0 over all ``Q`` and ``U`` that are not above 1, at the
+    It is the largest distance of the eigenvalues from 0 over all ``Q`` and ``U`` up to 1, at the
     rate ``decay``, ``alpha`` [1/s].
     """
     import cvxpy as cp
@@ -254,7 +254,7 @@ def _modes(plant: StateSpace) -> _Modes:
     a, basis = cdf2rdf(*np.linalg.eig(plant.A * time))
     b = np.linalg.solve(basis, plant.B[:, 0] * time)
     sizes = np.abs(b)
-    for k in np.flatnonzero(np.diag(a, 1)):  # the two of a pair share one size
+    for k in np.flatnonzero(np.diag(a, 1)):  # both of a conjugate pair share one scale
         sizes[k : k + 2] = np.hypot(b[k], b[k + 1])
     return _Modes(a, (b / sizes)[:, None], basis * sizes, time)
 
@@ -278,7 +278,7 @@ def _best_margin(
     whole = cp.bmat([[corner, side], [side.T, cp.reshape(last, (1, 1), order="C")]])
     bounds = [whole << -margin * np.eye(n + 1), q >> margin * np.eye(n), u >= margin]
     problem = cp.Problem(cp.Maximize(margin - penalty), [*bounds, q << np.eye(n), u <= 1.0])
-    with warnings.catch_warnings():  # the solution is judged below by its own eigenvalues
+    with warnings.catch_warnings():  # the eigenvalues of the solution are checked below
         warnings.filterwarnings("ignore", "Solution may be inaccurate", UserWarning)
         problem.solve(solver=cp.CLARABEL)
     if whole.value is None:

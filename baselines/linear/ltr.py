@@ -1,4 +1,4 @@
-"""Loop transfer recovery: a feedback controller from an identified linear plant (athans1986).
+"""Loop transfer recovery: design of a feedback controller for a linear plant (athans1986).
 
 The plant is augmented with an integrator at its input. Its filter loop is shaped to ``b / s``, an
 integrator of bandwidth ``b``, and a linear-quadratic regulator with a small weight on the control
@@ -92,7 +92,7 @@ class LtrDesign:
         return discrete(self.controller, period)
 
     def sampled_figures(self, period: float, delay: float = 0.0) -> LoopFigures:
-        """Return the figures of the loop at a control period, its hold and a delay [s] included."""
+        """Return the figures of the loop at a control period, with its hold and a delay [s]."""
         return sampled_figures(self.plant, self.discrete(period), delay)
 
 
@@ -137,9 +137,9 @@ def loop_figures(loop_response: Response, low: float = 1e-2, high: float = 1e4) 
     """Return the figures of a loop from its response to angular frequencies [rad/s].
 
     ``low`` and ``high`` [rad/s] limit the frequencies; ``low`` counts as static. The margins are
-    those of python-control on the tabulated response. On a product of sampled systems its own
-    frequency grid misses the crossover (8.4 in place of 9.02 rad/s for the printed controller at 10
-    ms), and a delay has no state-space form.
+    those of python-control on the tabulated response. Its own frequency grid misses the crossover
+    of a product of sampled systems (8.4 instead of 9.02 rad/s for the printed controller at 10 ms),
+    and a delay has no state-space form.
     """
     import control
 

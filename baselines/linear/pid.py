@@ -10,7 +10,7 @@ with good robustness", is ``tau_c = theta``.
 
 ``theta`` includes one and a half control periods besides the plant's dead time: half a period of
 the hold, and one of computing on a real rig. The environments have no computing delay (an action
-acts from the instant of its observation), so that there the whole period is margin.
+applies from the instant of its observation), so that in simulation the whole period is margin.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def pid_step(
 
 
 class PidView(NamedTuple):
-    """Set-point, measurement, reference and limits of the set-point, shapes (n_env,)."""
+    """Setpoint, measurement, reference and limits of the setpoint, shapes (n_env,)."""
 
     set_point: Array
     measured: Array
@@ -152,7 +152,7 @@ class Pid(RowController):
     period: float
 
     def initial_state(self, observation: ArrayLike) -> PidState:
-        """Return the state that holds the present set-point."""
+        """Return the state that holds the present setpoint."""
         view = self.view(observation)
         return pid_start(view.set_point, view.measured)
 

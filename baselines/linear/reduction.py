@@ -2,11 +2,11 @@
 
 The system is balanced, and the states with the smallest Hankel singular values are replaced by
 their equilibrium instead of truncated: the static gain stays exact, and the error is at most twice
-the sum of the Hankel singular values left out. An integrator is set aside first and added back.
+the sum of the omitted Hankel singular values. An integrator is separated first and added back.
 
 python-control balances with SLICOT only. On the mu-synthesised loop of this package its
-``hankel_singular_values`` loses one value to a negative square root and is off by 29 % for the
-smallest of those left; the square-root algorithm here is accurate to 0.05 % in all nine.
+``hankel_singular_values`` loses one value to a negative square root and has an error of 29 % in the
+smallest of the others; the square-root algorithm here is accurate to 0.05 % in all nine.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def _root(gramian: Array) -> Array:
 def split(system: StateSpace, frequency: float) -> tuple[StateSpace, StateSpace]:
     """Return the parts with poles within and beyond a frequency [rad/s], whose sum is the system.
 
-    The feed-through goes to the second. (Ordered Schur form and a Sylvester equation.)
+    The feedthrough belongs to the second. (Ordered Schur form and a Sylvester equation.)
     """
     form, basis, k = schur(system.A, sort=lambda re, im: np.hypot(re, im) <= frequency)
     if not 0 < k < system.nstates:

@@ -1,4 +1,4 @@
-"""Linear systems of one input and one output: python-control, and sampled systems over rows.
+"""Single-input single-output linear systems: python-control, and sampled systems over rows.
 
 Continuous systems are ``control.StateSpace`` objects: ``after * before`` is a series connection,
 ``system.feedback()`` closes a loop. Controllers run :class:`DiscreteSystem`, which advances many
@@ -73,8 +73,8 @@ def time_constant(system: StateSpace) -> float:
 def response(system: StateSpace, frequency: ArrayLike) -> Complex:
     """Return the frequency response at angular frequencies [rad/s], of their shape.
 
-    By a linear solve at each frequency: on the synthesised controller of order 12 it is exact to
-    6e-8, the Hessenberg form of python-control with SLICOT to 1.3e-5.
+    It uses a linear solve at each frequency: for the synthesised controller of order 12 it is exact
+    to 6e-8, the Hessenberg form of python-control with SLICOT to 1.3e-5.
     """
     s = 1j * np.asarray(frequency, float)
     return _evaluated(system.A, system.B[:, 0], system.C[0], system.D[0, 0], s)
@@ -139,7 +139,7 @@ class DiscreteSystem:
     def holding_state(self, y: ArrayLike) -> Array:
         """Return the state, shape (..., *lanes, n), that holds an output without input.
 
-        For systems with one integrator: its mode carries the whole output.
+        For systems with one integrator, whose mode provides the whole output.
         """
         mode = np.linalg.svd(self.a - np.eye(self.b.shape[-1]))[2][..., -1, :]
         gain = mode / np.sum(mode * self.c, axis=-1)[..., None]
@@ -165,7 +165,7 @@ class DiscreteSystem:
 
 
 def _evaluated(a: Array, b: Array, c: Array, d: Array | float, points: Complex) -> Complex:
-    """Return ``c (p - a)^-1 b + d`` at points ``p``, of their shape."""
+    """Return ``c (p - a)^-1 b + d`` at points ``p``, in the shape of ``p``."""
     gap = points[..., None, None] * np.eye(len(b)) - a
     states = np.linalg.solve(gap, np.broadcast_to(b[:, None], (*points.shape, len(b), 1)))
     return np.asarray(states[..., 0] @ c + d)

@@ -1,10 +1,11 @@
-"""Inverse kinematics of a manipulator: joint set-points for a reference pose.
+"""Inverse kinematics of a manipulator: joint setpoints for a reference pose.
 
 fluidic_muscles, section 2: of all joint angles of a pose, those that minimise the weight (2.1),
-which keeps joints off their limits, or the sum of their squares. A period starts from the angles
-and multipliers of the last one, so that a few Newton iterations suffice; an episode starts from the
-sensed angles. A pose out of reach, or without a direction, leaves the set-points unchanged, and is
-counted. :func:`pam_envs.mechanics.redundancy.resolve` plans a whole path, and raises there.
+which keeps joints away from their limits, or the sum of their squares. A period starts from the
+angles and multipliers of the last one, so that a few Newton iterations suffice; an episode starts
+from the sensed angles. A pose out of reach, or without a direction, leaves the setpoints unchanged
+and is counted. :func:`pam_envs.mechanics.redundancy.resolve` plans a whole path, and raises an
+error for such a pose.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ INSIDE = 0.999
 class PlanState(NamedTuple):
     """Solution of the last period, first axis n_env.
 
-    Set-points [rad], Lagrange multipliers of (2.2), shape (n_env, 5), and the number of poses out
+    Setpoints [rad], Lagrange multipliers of (2.2), shape (n_env, 5), and the number of poses out
     of reach so far.
     """
 
@@ -50,7 +51,7 @@ class PlanState(NamedTuple):
 
 @dataclass(frozen=True)
 class InverseKinematics(RowController):
-    """Set-points of all joints for the reference pose, without feedback of the tool.
+    """Setpoints of all joints for the reference pose, without feedback of the tool pose.
 
     ``sensed`` reads ``angle_k``, ``reference`` reads ``reference_x`` ... ``reference_point_z``; the
     limit is the largest angle of a joint [rad]; ``weighted``: whether the weight (2.1) or the sum
@@ -83,7 +84,7 @@ class InverseKinematics(RowController):
         return encode_actions(self.actions, angles.T, observation), after
 
     def _resolve(self, pose: Array, start: Array, multipliers: Any) -> Resolution | None:
-        """Return the set-points of a pose, None out of reach or without a direction."""
+        """Return the setpoints of a pose, None out of reach or without a direction."""
         if not np.any(pose[3:]):
             return None
         try:
@@ -141,7 +142,7 @@ def compare(
     Raises
     ------
     UnreachablePose
-        If the arm cannot take a pose.
+        If the arm cannot reach a pose.
     """
     return Comparison(
         resolve(chain, poses, limit, False, start), resolve(chain, poses, limit, True, start)

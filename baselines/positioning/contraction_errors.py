@@ -1,9 +1,10 @@
 """Positioning errors of the inverses of the contraction tables, by cross-validation over repeats.
 
-Of five repeats an inverse is made from four, and gives the pressure for every target from 2 to 14
-mm; the contraction at this pressure is read from the fifth repeat, linearly between its readings.
-Each repeat is left out in turn, at every load, on both branches. Pressures are clipped to the
-regulator's 0 to 6 bar. The published equations and those refitted to Table 6 used all five repeats.
+An inverse is fitted to four of the five repeats, and gives the pressure for every target from 2 to
+14 mm; the contraction at this pressure is read from the fifth repeat, linearly between its
+readings. Each repeat is left out in turn, at every load, on both branches. Pressures are clipped to
+the regulator's 0 to 6 bar. The published equations and those refitted to Table 6 used all five
+repeats.
 """
 
 from __future__ import annotations

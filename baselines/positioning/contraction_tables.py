@@ -1,12 +1,12 @@
-"""Inverses of measured contraction tables: the pressure for a contraction.
+"""Inverses of measured contraction tables: pressure as a function of contraction.
 
 positioning2021 programs a proportional regulator with six cubics p(x), one for each load and
-direction (Eqs. 7 to 12): here exactly as printed, refitted with care, and compared with other
-curves through the same readings.
+direction (Eqs. 7 to 12). They are provided exactly as printed, refitted in full precision, and
+beside other curves through the same readings.
 
-Between the measured loads the pressure is interpolated linearly; loads outside their range count as
-the nearest one. Both are assumed: the paper measured three loads only. Pressures may exceed the
-regulator's 0 to 6 bar; the caller clips them.
+Between the measured loads the pressure is interpolated linearly; loads outside their range are
+replaced by the nearest one. Both are assumptions: the paper measured only three loads. Pressures
+may exceed the regulator's 0 to 6 bar; the caller clips them.
 
 Curves are in the paper's units, mm and bar, in the order ``curves[load][branch]``, branch 0 being
 inflation: the order of Equations 1 to 6 and 7 to 12. Positioning errors:
@@ -91,7 +91,7 @@ class BranchCurves:
     def __call__(self, contraction: ArrayLike, inflating: ArrayLike, load: ArrayLike) -> Array:
         """Return the pressure [Pa], not clipped, of the shape to which the arguments broadcast.
 
-        For a desired contraction [m], whether the muscle comes from less, and a hanging mass [kg].
+        The arguments are desired contraction [m], direction (true if inflating), and payload [kg].
         """
         inflates, at = np.asarray(inflating, bool), np.asarray(load, float)
         scaled = np.asarray(contraction, float) / MM
@@ -148,7 +148,7 @@ def polynomial_inverse(table: ContractionTable | None = None, degree: int = 3) -
 
 
 def one_cubic_inverse(table: ContractionTable | None = None) -> BranchCurves:
-    """Return one cubic p(x) a load for both branches, without hysteresis.
+    """Return one cubic p(x) per load for both branches, without hysteresis.
 
     The common turning point counts in both branches.
     """
@@ -205,7 +205,7 @@ def _cloud(table: ContractionTable, load: float, inflating: bool) -> tuple[Array
 
 
 def _mean_curve(table: ContractionTable, load: float, inflating: bool) -> tuple[Array, Array]:
-    """Return pressure [bar], rising, and mean contraction [mm] of a branch."""
+    """Return increasing pressure [bar] and mean contraction [mm] of a branch."""
     pressure, contraction = table.branch(load, inflating)
     order = np.argsort(pressure)
     return pressure[order] / BAR, contraction.mean(axis=1)[order] / MM
@@ -216,7 +216,7 @@ def _polynomial(coefficients: Array, span: Array, contraction: Array) -> Array:
 
 
 def _pchip(pressure: Array, contraction: Array) -> Curve:
-    """Return the monotone interpolant p(x), held at its ends; falling means are left out."""
+    """Return the monotone interpolant p(x), held at its ends; decreasing means are omitted."""
     rising = np.r_[True, contraction[1:] > np.maximum.accumulate(contraction)[:-1]]
     curve = PchipInterpolator(contraction[rising], pressure[rising])
     return lambda target: np.asarray(curve(np.clip(target, curve.x[0], curve.x[-1])))

@@ -2,18 +2,18 @@
 
     reference, previewed -> inverse static law -> inverse hysteresis -> inverse regulator
 
-The hysteresis is driven by the pressures of the nominal regulator (first-order lag, slew limit)
-instead of the commanded ones: a pressure that was not reached leaves no trace in the muscle. Its
+The input of the hysteresis is the pressure of the nominal regulator (first-order lag, slew limit)
+instead of the commanded one: a pressure that was not reached does not affect the muscle. The
 initial state is the simplest history that explains the first measurement of an episode; later
 measurements are not used.
 
-Lead. A set-point acts on the contraction after the dead time, the horizon in which the regulator
-is driven to its target, and the lag of the mass. With preview, the target is the reference later by
+Lead. A setpoint affects the contraction after the dead time, the horizon in which the regulator is
+driven to its target, and the lag of the mass. With preview, the target is the reference ahead by
 this lead, linearly interpolated. Without preview it is the present reference.
 
 Early start. For a step, the regulator at its slew limit takes longer than the lead. The error of
-the transition is least when half of it precedes the step: a later sample of the preview becomes the
-target when the travel time to it exceeds ``EARLY`` times the remaining time.
+the transition is smallest if half of it precedes the step: a later sample of the preview becomes
+the target when the travel time to it exceeds ``EARLY`` times the remaining time.
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ from pam_envs.parameters import Signal
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 HORIZON = 0.02
-"""Time [s] in which the set-point would take the nominal pressure to its target."""
+"""Time [s] in which the setpoint would take the nominal pressure to its target."""
 EARLY = 1.6
-"""Travel time over remaining time at which a step is started. 2 would centre the transition on a
-step at the first sample that shows it; the step is up to a preview spacing before."""
+"""Travel time over remaining time at which a step is started. 2 would centre the transition on the
+first preview sample after the step; the step itself is up to one preview spacing earlier."""
 KNOBS: Bounds = {"horizon": (0.5, 4.0), "lead": (0.5, 2.0), "early": (0.5, 2.0)}
 
 
 class InverseState(NamedTuple):
-    """Nominal pressure and effective pressure [Pa] and hysteresis, one dead time later."""
+    """Nominal pressure and effective pressure [Pa] and hysteresis, one dead time ahead."""
 
     pressure: Array
     drive: Array
@@ -63,10 +63,11 @@ class InverseState(NamedTuple):
 class Inverse(RowController):
     """Exact inverse of the nominal muscle; see the module.
 
-    The signals read are contraction, set-point, load, reference and its preview. ``aims``, shape
+    The signals read are contraction, setpoint, load, reference and its preview. ``aims``, shape
     (n_aims, n_preview + 1), holds the weights of each target, the nearest first, and ``due`` the
-    travel time [s] from which it replaces the earlier ones. The set-point would take the nominal
-    pressure to its target within ``horizon`` [s], above 0: a longer one smooths it.
+    travel time [s] from which it replaces the earlier ones. The setpoint would take the nominal
+    pressure to its target within ``horizon`` [s], above 0; a longer horizon gives a smoother
+    setpoint.
     """
 
     nominal: Nominal
@@ -78,7 +79,7 @@ class Inverse(RowController):
 
     @cached_property
     def _lag_gain(self) -> float:
-        """Inverse of the share of a step that the regulator completes in the horizon."""
+        """Reciprocal of the share of a step that the regulator completes in the horizon."""
         return -1.0 / math.expm1(-self.horizon / self.nominal.plant.regulator.time_constant)
 
     def initial_state(self, observation: ArrayLike) -> InverseState:
@@ -105,7 +106,7 @@ class Inverse(RowController):
         return InverseState(pressure, drive, hysteresis)
 
     def feed_forward(self, measured: Array, now: InverseState) -> Array:
-        """Return the set-point [Pa], shape (n_env,), for the reference."""
+        """Return the setpoint [Pa], shape (n_env,), for the reference."""
         target = self._target(measured, now)
         set_point = now.pressure + self._lag_gain * (target - now.pressure)
         signal = self.action_signal
@@ -128,7 +129,7 @@ class Inverse(RowController):
         return np.asarray(target[last, np.arange(len(load))])
 
     def advance(self, now: InverseState, set_point: Array, load: Array) -> InverseState:
-        """Return the nominal muscle's state one control period on."""
+        """Return the nominal muscle's state one control period later."""
         pressure = self.nominal.next_pressure(now.pressure, set_point)
         drive = np.empty(len(load))
         hysteresis: Any = None

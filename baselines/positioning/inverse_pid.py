@@ -1,10 +1,10 @@
 """Inverse feedforward with a PID on the deviation from the nominal model (astrom2006, chapter 5).
 
-The PID does not compare the contraction with the reference, which would make it counteract the dead
-time, the slew limit and every early start. It compares the contraction with that of the *nominal*
-muscle under the same commands: dead time, regulator, hysteresis and static law, the lag of the mass
-counted as delay. With an exact model the PID is at rest; it corrects a wrong history, a wrong
-parameter or an undeclared load. (Two degrees of freedom with an internal model.)
+The PID compares the contraction with that of the *nominal* muscle under the same commands (dead
+time, regulator, hysteresis and static law, with the lag of the mass as a delay). A comparison with
+the reference would make it counteract the dead time, the slew limit and every early start. With an
+exact model the PID is at rest; it corrects a wrong history, a wrong parameter or an undeclared
+load. (Two degrees of freedom with an internal model.)
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ CURVE_POINTS = 1001
 
 @dataclass(frozen=True)
 class LoadedMuscle:
-    """The nominal muscle with one load [kg] on it."""
+    """The nominal muscle with one load [kg]."""
 
     plant: SingleMuscle
     load: float
@@ -68,7 +68,7 @@ class LoadedMuscle:
         return law.unstretched(output, full), after
 
     def pressure_for(self, drive: Array, state: HysteresisState) -> Array:
-        """Return the pressure [Pa] that gives an effective pressure [Pa] after this history."""
+        """Return the pressure [Pa] for an effective pressure [Pa] at this hysteresis state."""
         law, full = self.plant.hysteresis, self.plant.regulator.max_pressure
         found = self.hysteresis.inverse(law.stretched(drive, full), state)
         return law.unstretched(np.minimum(np.maximum(found, 0.0), full), full)
@@ -76,8 +76,9 @@ class LoadedMuscle:
     def explain(self, contraction: Array, pressure: Array) -> HysteresisState:
         """Return the hysteresis state of the simplest history of a first measurement.
 
-        From no pressure up to a peak, and down to the present pressure. A higher peak leaves more
-        contraction; it is found by bisection between the present and the full pressure.
+        The history rises from zero pressure to a peak and falls to the present pressure. A higher
+        peak leaves more contraction; the peak is found by bisection between present and full
+        pressure.
         """
         target = self.drive_for(contraction)
         low = np.array(pressure, float)
@@ -101,7 +102,7 @@ class Nominal:
 
     @cached_property
     def at(self) -> Callable[[float], LoadedMuscle]:
-        """From a load [kg] to the plant with it, cached."""
+        """Return the plant with a load [kg], cached."""
         return cache(partial(LoadedMuscle, self.plant))
 
     def groups(self, load: Array) -> Iterator[tuple[LoadedMuscle, Any]]:
@@ -111,7 +112,7 @@ class Nominal:
 
     @cached_property
     def mechanical_lag(self) -> float:
-        """Lag [s] of the mass behind the static curve: damping over stiffness, at mid-stroke."""
+        """Lag [s] of the mass behind the static curve: damping over stiffness at mid-stroke."""
         plant, load = self.plant, self.plant.mass.load
         full = plant.regulator.max_pressure
         low, high = plant.contraction_at(np.array([0.45, 0.55]) * full, load)
@@ -129,7 +130,7 @@ class Nominal:
 
     @cached_property
     def slowest_swing(self) -> float:
-        """Lowest natural frequency [rad/s] of the mass on the muscle: heaviest load, softest."""
+        """Lowest natural frequency [rad/s]: heaviest load, lowest stiffness of the muscle."""
         stiffness = self.plant.muscle.area / self.steepest_gain
         return math.sqrt(stiffness / (max(LOADS) + self.plant.mass.moving_mass))
 

@@ -7,9 +7,9 @@ half a control period of the hold, and one of computing. tau_c = theta, increase
 bandwidth would otherwise come within a factor of ``SWING`` of the natural frequency of the load on
 the muscle, which the rule's real lags do not describe.
 
-The regulator's slew limit causes windup as its range does: the set-point is limited about the
-*measured* pressure, to ``REACH`` times the smallest lead that keeps the nominal regulator at its
-slew limit.
+The regulator's slew limit causes windup like its range. The distance of the setpoint from the
+*measured* pressure is therefore limited to ``REACH`` times the smallest lead that keeps the nominal
+regulator at its slew limit.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ def simc(
 
 @dataclass(frozen=True)
 class MuscleView:
-    """View of contraction, pressure, set-point and reference.
+    """View of contraction, pressure, setpoint and reference.
 
-    ``reach`` is the largest distance [Pa] of the set-point from the measured pressure.
+    ``reach`` is the largest distance [Pa] of the setpoint from the measured pressure.
     """
 
     reader: Reader
@@ -70,7 +70,7 @@ class MuscleView:
     reach: float
 
     def __call__(self, observation: ArrayLike) -> PidView:
-        """Return what the PID needs from an observation."""
+        """Return the PID's view of an observation."""
         contraction, pressure, set_point, reference = self.reader.rows(observation)
         low = np.maximum(pressure - self.reach, self.action_signal.low)
         high = np.minimum(pressure + self.reach, self.action_signal.high)

@@ -1,8 +1,8 @@
 """Open-loop positioning from measured tables: one pressure curve for each load and branch.
 
 The method of positioning2021: curves p(contraction), one for inflation and one for deflation at
-each load; the set-point is the curve of the present branch at the present reference. Nothing is
-measured after the start. The curves are
+each load; the setpoint is the curve of the present branch at the present reference. No measurement
+is used after the start. The curves are
 
 - monotone piecewise cubics through the mean readings, without fitting error ("table");
 - the six published cubics (Eqs. 7 to 12) exactly as printed ("plc_as_printed"): some coefficients
@@ -15,13 +15,13 @@ measured after the start. The curves are
 
 The reference alone determines the branch, as in a programmable logic controller: it changes when
 the reference has reversed by more than a dead band from the extremum since the last change. A held
-reference keeps its branch, a step selects the right one at once, and a slow ramp does after the
-dead band; sensor noise has no influence.
+reference keeps its branch, a step selects the correct one at once, and a slow ramp after the dead
+band; sensor noise has no influence.
 
 Limitation: after a small reversal, wider than the dead band, the curve jumps from one branch of the
-*major* loop to the other, though the muscle has only entered a narrow inner loop. The set-point
-then jumps by up to the width of the major loop (1 bar), up to 3 mm of contraction. Only a state of
-all extrema resolves inner loops (:mod:`baselines.positioning.inverse`).
+*major* loop to the other, although the muscle has only entered a narrow minor loop. The setpoint
+then jumps by up to the width of the major loop (1 bar), up to 3 mm of contraction. Minor loops
+require a state of all extrema (:mod:`baselines.positioning.inverse`).
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ from pam_envs.parameters import Signal
 DEAD_BAND = 5e-5
 """Dead band [m] of the branches: 0.05 mm, below the repeatability of the tables."""
 LOWEST, HIGHEST = -0.01, 0.02
-"""Range of contractions [m] of the look-up tables; the end values hold beyond."""
+"""Range of contractions [m] of the look-up tables; beyond it the end values apply."""
 SPACING = 2e-6
 """Spacing [m] of the look-up tables; linear interpolation between is exact to 0.02 Pa."""
 
@@ -114,7 +114,7 @@ class TwoBranch(RowController):
 
     @cached_property
     def _tabulated(self) -> Callable[[float], tuple[Array, Array, Array]]:
-        """From a load to contractions [m], and pressures [Pa] of inflation and deflation."""
+        """Return contractions [m] and pressures [Pa] of inflation and deflation for a load."""
 
         @cache
         def tabulated(load: float) -> tuple[Array, Array, Array]:

@@ -3,7 +3,7 @@
 The numbers are those of ``joint_robust.json``, written by :mod:`baselines.robust.synthesis`. Both
 loops act on the angle of the model less that of the joint, and were designed for poles at 23 rad/s.
 For a joint with other poles ``p`` the loop is ``C(23 s / p)``, scaled in time: with a double pole
-there the loop gain is the same at ``p / 23`` of the frequency. ``mu`` is then not larger, as the
+at ``p`` the loop gain is the same at ``p / 23`` of the frequency. ``mu`` is then not larger, as the
 bound on the neglected dynamics is unchanged while the loop gain decreases at that frequency.
 
 In an arm the double pole only approximates a joint that oscillates and is coupled to the others: at

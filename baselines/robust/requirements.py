@@ -9,7 +9,7 @@ bounded as in Fig. 15; and the sensitivity is weighted:
 
 The paper prints neither the sector nor the functions. ``g`` is 0.35; ``W_p`` requires a bandwidth
 of 4 rad/s; ``W_m`` increases from 10 % to 300 %, with 100 % at 42 rad/s, which covers half a period
-of the hold and a whole one of computing, as on a real rig. All other fields of
+of the hold and one period of computing, as on a real rig. All other fields of
 :class:`RobustDesign` are assumed. The resulting sensitivity (0.013, 0.127 and 0.443 at 0.1, 1 and 4
 rad/s) agrees with another synthesis for the paper to 1 %; as the fields were free, this validates
 neither. The measure is the structured singular value ``mu`` of the three blocks, at most 1 if the

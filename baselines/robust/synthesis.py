@@ -1,4 +1,4 @@
-"""Synthesis of the disturbance loops of joints, off line: fluidic_muscles, section 4.
+"""Off-line synthesis of the joints' disturbance loops (fluidic_muscles, section 4).
 
     python -m baselines.robust.synthesis          # needs the extra "synthesis": control, slycot
 
@@ -10,11 +10,12 @@ extra. The steps:
 2. D-K iteration for ``mu``: each block is scaled by the magnitude that minimises the norm (for the
    rank-one matrix at hand ``d_i^2 = 1 / |a_i|``), fitted by a stable system with a stable
    inverse, and the synthesis is repeated; the controller of the round with the smallest ``mu``.
-3. Modes beyond ``FAST`` are replaced by their static gain, the slowest, which approximates an
-   integrator, becomes one, and the rest is reduced by balanced residualisation to ``ORDER`` states.
+3. Modes beyond ``FAST`` are replaced by their static gain; the slowest mode, an approximate
+integrator, is replaced by an exact one; the rest is reduced by balanced residualisation to
+``ORDER`` states.
 
-The real gain is scaled as if it were complex (D and not D, G); ``mu`` of the result is that with a
-real gain, exact, and its bound by SLICOT's AB13MD beside it.
+The real gain is scaled as if it were complex (D instead of D, G scaling). For the result, the exact
+``mu`` with a real gain and the bound by SLICOT's AB13MD are reported.
 """
 
 from __future__ import annotations
@@ -36,13 +37,13 @@ from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
 Scales = tuple[StateSpace, StateSpace] | None
 FILE = Path(__file__).with_name("joint_robust.json")
 FAST, INTEGRATOR = 1e3, 0.1
-"""Frequencies [rad/s] beyond which modes count as settled, and within which one integrates."""
+"""Frequencies [rad/s] above which modes count as static, and below which one is an integrator."""
 ROUNDS = 6
 SCALE_ORDER = 2
 ORDER = 2
-"""States beside the integrator: more change no figure in its third digit."""
+"""States besides the integrator; more states change no figure in its third digit."""
 FITTED = FREQUENCIES <= 300.0
-"""Frequencies at which the scales are fitted: above, no block matters."""
+"""Frequencies at which the scales are fitted; no block matters above them."""
 PROBES = (0.1, 1.0, 4.0)
 """Frequencies [rad/s] at which the sensitivity is reported."""
 
