@@ -137,7 +137,7 @@ class OracleBatch:
         self.position = np.zeros(len(states))
 
     def run(self, set_points: ArrayLike) -> Array:
-        """Hold set-points [Pa], shape (T, n); return readings and position, (3, T, n)."""
+        """Hold setpoints [Pa], shape (T, n); return readings and position, (3, T, n)."""
         commands = np.ascontiguousarray(set_points, np.float64) / BAR
         heat, steps = self._celsius, steps_in(PERIOD)
         rows = _advance(self._constants, self.states, commands, heat, steps)
@@ -146,7 +146,7 @@ class OracleBatch:
         return rows
 
     def step(self, set_points: ArrayLike) -> tuple[Array, Array]:
-        """Hold set-points [Pa] for a period; return contractions [m] and pressures [Pa] read."""
+        """Hold setpoints [Pa] for a period; return contractions [m] and pressures [Pa] read."""
         rows = self.run(np.asarray(set_points, float)[None, :])
         return rows[0, 0], rows[1, 0]
 

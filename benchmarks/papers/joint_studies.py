@@ -1,6 +1,6 @@
 """Studies of the joint's control on the paper's reduced plant: fluidic_muscles, sections 3.2 and 4.
 
-The plant is the paper's: a symmetric Preisach operator from set-point to ``w``, then ``23^2 / (s +
+The plant is the paper's: a symmetric Preisach operator from setpoint to ``w``, then ``23^2 / (s +
 23)^2``. The controllers are those of the catalogue, at 10 ms; the angle is sampled every 1 ms.
 The paper prints no hysteresis; the assumed one has loops whose half-gap is 10 % of their amplitude
 at 10 and at 30 degrees, gain 1 between the tips of the largest loop, and 0.65 after a turn, the low

@@ -23,7 +23,7 @@ JUDGED = "rig, 0.5 bar"
 """Run that presumably gave the published figures."""
 NO_NOISE = "in the environment, no sensor noise"
 LARGEST = "largest in 0.5 s after the switch, mean of strides"
-FASTER = "swing holds the set-point at its limit until the heel's contact"
+FASTER = "swing holds the setpoint at its limit until the heel's contact"
 FLEXORS = "what the flexors do more than without is added, which the paper did not measure"
 HANDOVERS: tuple[tuple[str, bool, bool, str, dict[str, Any]], ...] = (
     (

@@ -124,7 +124,7 @@ def _angle(ax: Any, signals: Signals) -> None:
 
 def _pressure(ax: Any, signals: Signals) -> None:
     time = signals["time"]
-    ax.plot(time, BAR * signals["set_point"], color="0.55", linewidth=0.8, label="set-point")
+    ax.plot(time, BAR * signals["set_point"], color="0.55", linewidth=0.8, label="setpoint")
     ax.plot(time, BAR * signals["state/pressure"], color=PRESSURE, label="pressure")
     ax.axhline(4.5, color="0.4", linewidth=0.8, linestyle=":", label="capacity")
 

@@ -1,7 +1,7 @@
 """Test of a rig's hysteresis: Everett map, symmetry, congruency and wiping out, with a verdict.
 
 fluidic_muscles (section 3.2) drives the joint along the ascending branch, turns at chosen
-set-points and lets it fall to negative saturation: first-order descending curves, which give the
+setpoints and lets it fall to negative saturation: first-order descending curves, which give the
 Everett map ``E(alpha, beta) = f_alpha - f_alphabeta`` (3.2). The printed rule for the other half,
 ``f_alphabeta = -f_betaalpha``, is wrong; it is ``E(beta, alpha) = -E(alpha, beta)``.
 
@@ -111,7 +111,7 @@ class JointHysteresis:
 def measure_joint(rig: Rig, amplitude: float, levels: int = 21) -> JointHysteresis:
     """Return the hysteresis of a joint between ``-amplitude`` and ``amplitude`` [rad].
 
-    ``rig`` maps set-points [rad] to angles at rest [rad]; see :func:`measure_hysteresis`.
+    ``rig`` maps setpoints [rad] to angles at rest [rad]; see :func:`measure_hysteresis`.
     """
     return measure_hysteresis(rig, -amplitude, amplitude, levels)
 

@@ -68,7 +68,7 @@ def fit_force_map(data: MeasuredMap, start: ForceMap | None = None) -> ForceMap:
 
 
 def loop_commands(seed: int = 0, turns: int = 40) -> Array:
-    """Return set-points [rad]: loops of falling amplitude, then random turns, shape (T,)."""
+    """Return setpoints [rad]: loops of falling amplitude, then random turns, shape (T,)."""
     phase = np.linspace(0.0, 4.0 * np.pi, 121)[1:]
     parts = [np.radians(a) * np.sin(phase) for a in AMPLITUDES]
     at = 0.0
@@ -83,7 +83,7 @@ def fit_angle_plays(
 ) -> tuple[PlayOperator, float]:
     """Return plays of total slope 1 that rest where a plant with muscles does, and the error left.
 
-    The operator maps set-points [rad] to angles at rest [rad], with thresholds (n,) [rad]; the
+    The operator maps setpoints [rad] to angles at rest [rad], with thresholds (n,) [rad]; the
     error is the RMS over :func:`loop_commands` [rad].
     """
     commands = loop_commands()

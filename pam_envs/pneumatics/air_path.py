@@ -1,4 +1,4 @@
-"""Path of the air from a set-point to a muscle: dead time, regulator, supply, leak and line."""
+"""Path of the air from a setpoint to a muscle: dead time, regulator, supply, leak and line."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def delay_commands(
     newer: Any,
     switch: Any,
 ) -> None:  # fmt: skip
-    """Write the two delayed set-points of a control period and the time between them.
+    """Write the two delayed setpoints of a control period and the time between them.
 
-    ``ring`` is the first row of the last set-points, ``dead`` the dead times [s], ``step`` the
+    ``ring`` is the first row of the last setpoints, ``dead`` the dead times [s], ``step`` the
     control periods and ``period`` their duration [s]. ``older`` takes effect first, then, at
     ``switch`` [s], ``newer`` [Pa].
     """

@@ -1,13 +1,13 @@
 """Modes of the orthosis' measured frequency response, and its plain regulator.
 
-yeh2010 identifies the response from pressure set-point to tension as ``G_T(s)``, Eq. (10): seven
-poles, four zeros. Divided by its static gain it is the response from set-point to pressure in the
+yeh2010 identifies the response from pressure setpoint to tension as ``G_T(s)``, Eq. (10): seven
+poles, four zeros. Divided by its static gain it is the response from setpoint to pressure in the
 preset "measured". In partial fractions each mode is
 
     x' = p (x - u),    pressure = sum_i gain_i x_i
 
-so that a step at a held set-point is exact for any duration, and every mode of a plant at rest is
-the set-point itself.
+so that a step at a held setpoint is exact for any duration, and every mode of a plant at rest is
+the setpoint itself.
 """
 
 from __future__ import annotations
@@ -116,6 +116,6 @@ def pair_factor(decay_rate: float, frequency: float, h: float) -> tuple[float, f
 
 @kernel
 def turned(u: float, real: float, imaginary: float, c: float, s: float) -> tuple[float, float]:
-    """Return the pair's state after an interval at the set-point ``u``; ``c + i s`` is exp(p h)."""
+    """Return the pair's state after an interval at the setpoint ``u``; ``c + i s`` is exp(p h)."""
     a = real - u
     return u + a * c - imaginary * s, a * s + imaginary * c

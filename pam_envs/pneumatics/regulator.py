@@ -29,7 +29,7 @@ UNCHOKED = 100.0
 class ValveEffects:
     """Effects of a regulator's valve."""
 
-    gain: float = assumed(1.0, "1", 0.5, 1.5, "pressure reached over set-point", neutral=1.0)
+    gain: float = assumed(1.0, "1", 0.5, 1.5, "pressure reached over setpoint", neutral=1.0)
     slew_bend: float = effect("1", 0.0, 1.0, "from a sharp slew limit to a rounded one")
     dead_band: float = effect("Pa", 0.0, 3e5, "error that the valve does not answer")
     dead_close: float = assumed(1.0, "1", 0.0, 1.0, "closing error over dead_band")
@@ -66,14 +66,14 @@ class DelayedEffects(RegulatorEffects):
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (("dead_time",), *RegulatorEffects.effects)
 
-    dead_time: float = effect("s", 0.0, 0.11, "of the set-point")
+    dead_time: float = effect("s", 0.0, 0.11, "of the setpoint")
 
 
 @dataclass(frozen=True)
 class Regulator(RegulatorEffects):
     """Closed-loop pressure regulator.
 
-    The set-point, held between 0 and ``max_pressure``, takes effect after ``dead_time``. The
+    The setpoint, held between 0 and ``max_pressure``, takes effect after ``dead_time``. The
     pressure then follows it by a first-order lag whose rate is limited to ``slew_rate``. No value
     was published for the regulator of the measured muscle (Festo MPPES-3-1/4-6-010): the defaults
     are assumed, within what two identified regulators of its class show.

@@ -25,7 +25,7 @@ class GaitAssistance:
     angle_scale: float = assumed(0.0349, "rad", 1e-5, 3.0, "swing error that costs angle_weight")
     over_weight: float = weight(0.2, "cost of over_scale more torque than the knee demands")
     over_scale: float = assumed(5.0, "N m", 1e-3, 1e3, "over-assistance that costs over_weight")
-    effort_weight: float = weight(0.2, "cost of moving the set-point over its whole range")
+    effort_weight: float = weight(0.2, "cost of moving the setpoint over its whole range")
     soft_pressure: float = derived(4.45e5, "Pa", 0.0, 1e7, "below the capacity of 4.5 bar, yeh2010")
     soft_deviation: float = assumed(0.1745, "rad", 0.0, 3.0, "10 degrees off the path: discomfort")
     highest_tension: float = assumed(800.0, "N", 1.0, 1e5, "the strap slips; beyond 4.5 bar")
@@ -38,7 +38,7 @@ class BraceTracking:
 
     tracking_weight: float = weight(1.0, "reward per control period at an error of error_scale")
     error_scale: float = assumed(0.02, "1", 1e-6, 10.0, "error that costs tracking_weight")
-    effort_weight: float = weight(0.2, "cost of moving the set-point over its whole range")
+    effort_weight: float = weight(0.2, "cost of moving the setpoint over its whole range")
     soft_pressure: float = derived(4.45e5, "Pa", 0.0, 1e7, "below the capacity of 4.5 bar, yeh2010")
     highest_tension: float = assumed(600.0, "N", 1.0, 1e5, "above 355 N at the capacity, rigid rig")
 

@@ -19,7 +19,7 @@ def error_reward(error: float, scale: float, weight: float) -> float:
 
 @kernel
 def effort_reward(change: float, full: float, weight: float) -> float:
-    """Return the reward for a change of set-point relative to its range: at most 0."""
+    """Return the reward for a change of setpoint relative to its range: at most 0."""
     return -weight * abs(change) / full
 
 

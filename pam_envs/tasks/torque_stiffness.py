@@ -43,7 +43,7 @@ class TorqueStiffness:
     )
     stiffness_scale: float = assumed(0.5, "N m/rad", 1e-4, 1e3, "error that costs stiffness_weight")
     effort_weight: float = weight(
-        0.2, "cost of moving both set-points over their range, or of coils that are always on"
+        0.2, "cost of moving both setpoints over their range, or of coils that are always on"
     )
     soft_pressure: float = assumed(5.9e5, "Pa", 0.0, 1e7, "below the supply, chakarov2018")
     lightest: float = assumed(0.3, "kg", 0.0, 10.0, "lightest weight drawn: a cup")

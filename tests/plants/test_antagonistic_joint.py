@@ -22,7 +22,7 @@ MADE = (AntagonisticJoint.paper("none"), AntagonisticJoint.measured("none"))
 
 
 def half_gap(plant: AntagonisticJoint, degrees: float) -> float:
-    """Half the height of a settled loop at set-point 0, over its amplitude."""
+    """Half the height of a settled loop at setpoint 0, over its amplitude."""
     phase = np.linspace(0.0, 4.5 * np.pi, 181)
     rests = np.degrees(plant.rest_angles(np.radians(degrees) * np.sin(phase)))
     up, down = rests[[80, 160]].mean(), rests[120]  # half way up twice, half way down between

@@ -310,7 +310,7 @@ def test_the_felt_torque_moves_the_forearm() -> None:
     own = wearer.mass * wearer.centre * plant.link.gravity * (np.sin(intent[0]) - np.sin(q))
     balance = wearer.inertia * (intent[2] - bend) + made["wearer"] + own + made["felt"]
     quiet = np.ones(300, bool)
-    for start in (0, 100, 200):  # where set-points jump the differences do not hold
+    for start in (0, 100, 200):  # where setpoints jump the differences do not hold
         quiet[max(0, start - 2) : start + 15] = False
     quiet[-2:] = False
     assert np.abs(balance[quiet]).max() < 0.01

@@ -52,7 +52,7 @@ def test_phases_equal_the_published_ones() -> None:
 
 
 def test_steps_are_exact() -> None:
-    """Steps of two lengths under held set-points, against a cascade integrated numerically."""
+    """Steps of two lengths under held setpoints, against a cascade integrated numerically."""
     rows = mode_rows()
     rates, gains = np.array(rows[:REAL_MODES]), rows[REAL_MODES : 2 * REAL_MODES]
     decay_rate, frequency, real_gain, imaginary_gain = rows[2 * REAL_MODES :]

@@ -37,7 +37,7 @@ class Kernels:
     """Rows of state and parameters, and integer rows without those of the seed."""
     set_points: int
     old_set_points: int
-    """First row of the set-points, and of those of the previous period."""
+    """First row of the setpoints, and of those of the previous period."""
     channels: int = 1
     """References that are tracked at once."""
     config: Any = NONE

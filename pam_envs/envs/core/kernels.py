@@ -113,7 +113,7 @@ def report_tracking(
 def report_pressure(
     work: Any, config: Any, info: Any, at: Any, pressure: float, change: float, full: float, j: int
 ) -> None:
-    """Write cost and margin of the highest pressure, and the reward for a change of set-points."""
+    """Write cost and margin of the highest pressure, and the reward for a change of setpoints."""
     work[info.cost_pressure][j] = excess(pressure, config[at.soft_pressure])
     work[info.margin_pressure][j] = config[at.soft_pressure] - pressure
     work[info.reward_effort][j] = effort_reward(change, full, config[at.effort_weight])

@@ -6,7 +6,7 @@ family adds kernels and sizes, which replace the placeholders below when the ker
 
 Arguments of the kernels, of every family:
 
-* ``rows``, shape (n, lanes): the state. The set-points are one block of rows, those of the previous
+* ``rows``, shape (n, lanes): the state. The setpoints are one block of rows, those of the previous
   period another.
 * ``fixed``, shape (n, lanes): the parameters.
 * ``counts``, shape (n, lanes): integers. KEY_A, ... MEMBER, the family's own, and last
@@ -80,7 +80,7 @@ def do_nothing(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, 
 def take_actions(
     rows: Any, settings: Any, choices: Any, work: Any, actions: Any, start: int
 ) -> None:
-    """Turn actions into set-points."""
+    """Turn actions into setpoints."""
     saturated, last = work[FIRST_INFO + N_INFO - 1], len(actions) - 1
     for k in range(choices[CHOICE.actions]):
         scale = settings[choices[CHOICE.at_actions] + k]

@@ -162,7 +162,7 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
 
 @kernel
 def effort_of(rows: Any, choices: Any, j: int) -> float:
-    """Return the change of both set-points, or the sum of the last pulse widths."""
+    """Return the change of both setpoints, or the sum of the last pulse widths."""
     a, b = rows[K.COMMAND_A][j], rows[K.COMMAND_B][j]
     if choices[L.CHOICE.pulsed] > 0:
         return abs(a) + abs(b)

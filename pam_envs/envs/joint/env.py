@@ -1,9 +1,9 @@
 """``PAM/AntagonisticJoint-v0``: a joint between two pneumatic muscles, fluidic_muscles.
 
 Two muscles pull a lever from both sides. The angle ``phi`` is 0 where both are equally long and
-positive towards muscle A. The friction of the muscles makes the angle follow its set-point with
-hysteresis. The action is a set-point of the angle, which the static laws of both muscles convert to
-two pressures under a fixed prestress; or set-points of angle and prestress, that is of position and
+positive towards muscle A. The friction of the muscles makes the angle follow its setpoint with
+hysteresis. The action is a setpoint of the angle, which the static laws of both muscles convert to
+two pressures under a fixed prestress; or setpoints of angle and prestress, that is of position and
 stiffness; or the two pressures.
 
 Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``):
@@ -24,7 +24,7 @@ Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=F
 Action: angle_set_point, over the joint's range; or angle_set_point and prestress; or
 pressure_a_set_point and pressure_b_set_point, 0 .. 6.5e5 Pa.
 
-Reward: ``-|angle - reference| / 1 degree - 0.2 (change of both pressures' set-points) / 13 bar``
+Reward: ``-|angle - reference| / 1 degree - 0.2 (change of both pressures' setpoints) / 13 bar``
 each control period. Where a limit ends the episode, ``reward/ended`` adds the lowest possible
 reward of each remaining period, so that ending an episode never pays.
 
@@ -109,7 +109,7 @@ def make_setup(
         and ``frequency``, from 0), "step" (from 0 to ``amplitude`` at 1 s), or samples [rad].
         Reward: :class:`~pam_envs.tasks.joint_tracking.JointTracking`.
     action : {"angle", "angle_stiffness", "pressures"}
-        Set-point of the angle under a fixed prestress; of angle and prestress; of both pressures.
+        Setpoint of the angle under a fixed prestress; of angle and prestress; of both pressures.
     amplitude : float, optional
         Amplitude of references [rad]. Default: two thirds of the joint's limit. The muscles have
         to hold the link and the heaviest payload there.

@@ -143,7 +143,7 @@ def angle_ticks(plant: Any) -> range:
 
 
 class JointIntegral:
-    """Angle set-points: reference, shift by the declared weight, slow integral of the error."""
+    """Angle setpoints: reference, shift by the declared weight, slow integral of the error."""
 
     gain = 0.03
     """Integral gain per control period."""

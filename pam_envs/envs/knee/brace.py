@@ -1,6 +1,6 @@
 """``PAM/KneeTension-v0`` and ``PAM/KneeStiffness-v0``: the brace of the orthosis, not worn.
 
-A pneumatic muscle works against the zig-zag spring of a knee brace. The action is the set-point of
+A pneumatic muscle works against the zig-zag spring of a knee brace. The action is the setpoint of
 its pressure. In ``KneeTension`` its tension has to follow a reference ("no load", yeh2010,
 section 5.1), in ``KneeStiffness`` its stiffness ``T / (L - L_min)`` (section 3). The stiffness
 follows the pressure with hysteresis: it differs between inflation and deflation.
@@ -19,7 +19,7 @@ Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=F
 
 Action: pressure_set_point, 0 .. 4.5e5 Pa over [-1, 1].
 
-Reward: ``-|output - reference| / (2 % of the reference's half-range) - 0.2 |change of set-point| /
+Reward: ``-|output - reference| / (2 % of the reference's half-range) - 0.2 |change of setpoint| /
 4.5 bar`` each control period.
 
 Start: at rest under a random pressure (``start="paper"``: at about 55 N). End:

@@ -1,6 +1,6 @@
 """``PAM/KneeWalk-v0``, ``PAM/KneeStairsUp-v0``, ``PAM/KneeStairsDown-v0``: gait assistance.
 
-A wearer walks with the knee orthosis of yeh2010 on one leg. The action is the set-point of the
+A wearer walks with the knee orthosis of yeh2010 on one leg. The action is the setpoint of the
 pressure of its muscle. In stance, which the load on the heel distinguishes from swing, the tension
 of the muscle has to give a share of the knee torque, 20 % by default; in swing the knee has to move
 as it would without the orthosis. The wearer holds the intended path like a spring and a damper, and
@@ -30,7 +30,7 @@ Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=F
 Action: pressure_set_point, 0 .. 4.5e5 Pa over [-1, 1].
 
 Reward, each control period: ``- stance |tension error| / 10 N - swing |angle error| / 2 degrees
-- 0.2 over-assistance / 5 N m - 0.2 |change of set-point| / 4.5 bar``.
+- 0.2 over-assistance / 5 N m - 0.2 |change of setpoint| / 4.5 bar``.
 
 Start: at a random phase of the stride (``start="heel_contact"``: at its beginning), at rest on the
 path, near the pressure that the reference needs. End: truncated after ``episode_seconds``;

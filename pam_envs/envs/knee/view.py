@@ -125,7 +125,7 @@ def brace_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
 
 
 class BraceFeedforward:
-    """Set-point from the inverse of spring and lever, then of the hysteresis."""
+    """Setpoint from the inverse of spring and lever, then of the hysteresis."""
 
     def __init__(self, env: Any) -> None:
         self.plant, self.signals = env.plant, env.signals

@@ -3,7 +3,7 @@
 Twelve pneumatic muscles bend an arm of six links about axes x, y, x, y, x, y. Its tool has to
 follow a path in position and direction: five numbers for six joints, so that the arm is redundant.
 The joint angles along the path are planned in advance, with the weight of Eq. (2.1) of the paper
-that keeps joints away from their limits, and can be observed. The action is a set-point of each
+that keeps joints away from their limits, and can be observed. The action is a setpoint of each
 angle, which the static laws of the muscles convert to pressures; or all pressures. Weight, links
 and payload couple the joints.
 
@@ -27,7 +27,7 @@ Action: angle_set_point_k, over the joints' range; or pressure_ka_set_point and
 pressure_kb_set_point, 0 .. 6.5e5 Pa.
 
 Reward: ``-|tip - path| / 2 cm - 0.5 |direction - path's| / 2 degrees - 0.2 (change of all
-pressures' set-points) / (2 n 6.5 bar)`` each control period. Where a limit ends the episode,
+pressures' setpoints) / (2 n 6.5 bar)`` each control period. Where a limit ends the episode,
 ``reward/ended`` adds the lowest possible reward of each remaining period, so that ending an episode
 never pays.
 
@@ -144,7 +144,7 @@ def make_setup(
         ends); or the poses of a path, shape (k, 6): x, y, z [m] and a unit vector in each row.
         Reward: :class:`~pam_envs.tasks.joint_tracking.PathTracking`.
     action : {"angle", "pressures"}
-        A set-point of each angle, under a fixed prestress; or of each pressure.
+        A setpoint of each angle, under a fixed prestress; or of each pressure.
     plan : bool
         Whether the planned joint angles are observed.
     weighted : bool
@@ -155,7 +155,7 @@ def make_setup(
     payload : float, sequence of float or None
         Mass [kg] at the tip; of several, each episode draws one; None: any that the paths allow, up
         to 0.1 kg. The muscles have to hold the heaviest one, with its change, at rest in every pose
-        of the plan; with set-points of angles, with set-points within their range.
+        of the plan; with setpoints of angles, with setpoints within their range.
     payload_change : float
         Change of the payload [kg], up or down, at an unannounced time.
 

@@ -1,6 +1,6 @@
 """``PAM/MusclePositioning-v0``: position a hanging load with one pneumatic muscle.
 
-A Festo MAS-10-N-100 lifts a load. The action is the set-point of its pressure regulator; the task
+A Festo MAS-10-N-100 lifts a load. The action is the setpoint of its pressure regulator; the task
 is to make the contraction follow a reference. The muscle has hysteresis: at the same pressure, the
 contractions during inflation and deflation differ by up to 3.3 mm on a stroke of 15 mm.
 
@@ -17,7 +17,7 @@ Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=F
 
 Action: pressure_set_point, 0 .. 6e5 Pa over [-1, 1].
 
-Reward: ``-|output - reference| / 1 mm - 0.2 |change of set-point| / 6 bar`` each control period.
+Reward: ``-|output - reference| / 1 mm - 0.2 |change of setpoint| / 6 bar`` each control period.
 
 Start: at rest under a random pressure, reached from a random higher one (``start="rest"``: at zero
 pressure, never inflated). End: truncated after ``episode_seconds``; terminated when the contraction

@@ -107,7 +107,7 @@ def _ruler(canvas: S.Canvas, highest: float, contraction: float, reference: floa
 
 
 class InverseFeedforward:
-    """Set-point from the exact inverse of static law and hysteresis."""
+    """Setpoint from the exact inverse of static law and hysteresis."""
 
     def __init__(self, env: Any) -> None:
         self.plant, self.signals = env.plant, env.signals

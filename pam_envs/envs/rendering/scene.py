@@ -98,7 +98,7 @@ def view_of(env: Any) -> View:
 
 
 def full_bar(plant: Any) -> float:
-    """Return the largest set-point [bar]."""
+    """Return the largest setpoint [bar]."""
     return 1e-5 * float(plant.regulator.max_pressure)
 
 

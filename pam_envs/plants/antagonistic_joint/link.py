@@ -15,7 +15,7 @@ _FORM = "a slender rod of 0.3 kg; the masses of fluidic_muscles's stages are not
 class Stage:
     """Limits, damping and mechanical stops of one joint.
 
-    ``limit`` bounds the set-point. The stop is a stiff spring beyond ``stop``, before the
+    ``limit`` bounds the setpoint. The stop is a stiff spring beyond ``stop``, before the
     stretched muscle loses its lever arm.
     """
 

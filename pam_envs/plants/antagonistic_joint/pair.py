@@ -67,9 +67,9 @@ def advance(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, substeps: int,
     period: float, work: Any,
 ) -> None:  # fmt: skip
-    """Advance a tile by one control period, towards its set-points [Pa].
+    """Advance a tile by one control period, towards its setpoints [Pa].
 
-    Set-points, disturbance [N m] and payload [kg] are the caller's to write, and the command that
+    Setpoints, disturbance [N m] and payload [kg] are the caller's to write, and the command that
     the reduced plant follows. ``hysteresis`` is the first row of the hysteresis state, ``elements``
     that of the plant; ``work`` are rows of scratch.
     """

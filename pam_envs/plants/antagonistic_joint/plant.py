@@ -1,6 +1,6 @@
 """One stage of fluidic_muscles: a joint between two antagonistic pneumatic muscles.
 
-    (angle, co-contraction) -> feedforward -> set-points -> regulators -> pressures
+    (angle, co-contraction) -> feedforward -> setpoints -> regulators -> pressures
     F = F(p, e) - friction(e)          of each muscle, 0 where it would push
     J phi'' + D phi' = -F_A dL_A/dphi - F_B dL_B/dphi - m g c sin(phi) + disturbance
 
@@ -146,7 +146,7 @@ class AntagonisticJoint(PairPlant, rows=K):
     def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
         """Return the least and the largest torque [N m] at angles [rad].
 
-        Set-points of angles end at their limit, and so does what they exert; pressures do not.
+        Setpoints of angles end at their limit, and so does what they exert; pressures do not.
         """
         if self.dynamics != "reduced":
             return super().torque_range(angles, by_pressure)
@@ -156,7 +156,7 @@ class AntagonisticJoint(PairPlant, rows=K):
         return low, high
 
     def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
-        """Return the addition to set-points [rad] that bears gravity, shape (..., 1).
+        """Return the addition to setpoints [rad] that bears gravity, shape (..., 1).
 
         ``angles`` (..., 1) [rad] are those at which link and payload [kg] shall rest.
         """
@@ -166,7 +166,7 @@ class AntagonisticJoint(PairPlant, rows=K):
     # --- rows, files, identity --------------------------------------------------------------------
 
     def rest_angles(self, commands: ArrayLike, prestress: float | None = None) -> Array:
-        """Return the angles at rest [rad] after each of a series of set-points [rad], (T,).
+        """Return the angles at rest [rad] after each of a series of setpoints [rad], (T,).
 
         Quasi-static, hysteresis included, from the straight virgin state, without gravity and load.
         """

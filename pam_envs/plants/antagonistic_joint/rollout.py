@@ -122,12 +122,12 @@ def simulate_joint(
     plants : AntagonisticJoint or sequence of them
         Of one make and hysteresis, and with the same sub-steps; a hysteresis map is the first's.
     commands : array_like, shape (T,) or (T, n)
-        Set-points [rad] of the feedforward, one a control period.
+        Setpoints [rad] of the feedforward, one a control period.
     prestress, disturbance, payload : array_like
         Co-contraction [N] (default: the first plant's), torque [N m] and mass at the link's end
         [kg]; a number or as ``commands``.
     pressures : tuple of array_like, optional
-        Set-points [Pa] of both muscles in the place of the feedforward's, each as ``commands``.
+        Setpoints [Pa] of both muscles in the place of the feedforward's, each as ``commands``.
     quasi_static : bool
         Whether each command is held until rest (from which the next one starts) instead of for a
         control period; commands only.
@@ -156,7 +156,7 @@ def simulate_joint(
 def rest_angles(
     plant: AntagonisticJoint, commands: ArrayLike, prestress: float | None = None
 ) -> Array:
-    """Return the angle at rest [rad] after each of a series of set-points [rad], shape (T,).
+    """Return the angle at rest [rad] after each of a series of setpoints [rad], shape (T,).
 
     From the straight virgin state, without gravity and load.
     """

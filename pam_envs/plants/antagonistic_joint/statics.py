@@ -41,7 +41,7 @@ class PairPlant(Plant):
             )
         if limits.limit > limits.stop:
             raise ValueError(
-                f"limit = {limits.limit:g} rad of the set-point lies beyond the stop at "
+                f"limit = {limits.limit:g} rad of the setpoint lies beyond the stop at "
                 f"{limits.stop:g} rad; lower the limit"
             )
 
@@ -49,7 +49,7 @@ class PairPlant(Plant):
 
     @property
     def angle_range(self) -> tuple[float, float]:
-        """Lowest and highest set-point [rad] of a joint."""
+        """Lowest and highest setpoint [rad] of a joint."""
         return -self.link.limit, self.link.limit
 
     @property
@@ -64,7 +64,7 @@ class PairPlant(Plant):
 
     @property
     def prestress_range(self) -> tuple[float, float]:
-        """Lowest and highest co-contraction [N] that is a set-point."""
+        """Lowest and highest co-contraction [N] that is a setpoint."""
         return PRESTRESS_RANGE
 
     # --- statics --------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ class PairPlant(Plant):
     def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
         """Return the least and the largest torque [N m] of the muscles at angles [rad].
 
-        Set-points of angles end at their limit, and so does what they exert; pressures do not.
+        Setpoints of angles end at their limit, and so does what they exert; pressures do not.
         """
         a, b = np.array(self.regulator.max_pressure), np.array(0.0)
         if not by_pressure:
@@ -139,7 +139,7 @@ class PairPlant(Plant):
     def shift_for(
         self, angle: ArrayLike, prestress: float, torque: ArrayLike, limit: float
     ) -> Array:
-        """Return the addition to a set-point [rad] within ``limit`` to rest under a torque.
+        """Return the addition to a setpoint [rad] within ``limit`` to rest under a torque.
 
         The muscles then exert ``torque`` [N m] at ``angle`` [rad], or come as near as they can.
         """

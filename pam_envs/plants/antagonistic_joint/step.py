@@ -1,6 +1,6 @@
 """One control period of the antagonistic joint, for one environment or a tile of them.
 
-    set-points -> regulators -> pressures -> muscles on their lever -> angle
+    setpoints -> regulators -> pressures -> muscles on their lever -> angle
 
 The regulators are exact at the end of a sub-step. The motion is exact for the torque linearised
 about the predicted middle, with the pressures going straight from their old to their new values:

@@ -1,6 +1,6 @@
-"""Path from a set-point to the effective pressure of a muscle, with all effects on it.
+"""Path from a setpoint to the effective pressure of a muscle, with all effects on it.
 
-    set-point -> dead time -> regulator, supply, leak -> line -> creep -> temperature, first cycles
+    setpoint -> dead time -> regulator, supply, leak -> line -> creep -> temperature, first cycles
 
 For plants whose hysteresis follows the contraction; each muscle has a state of its own, and all
 muscles of a plant share the parameters.
@@ -73,7 +73,7 @@ def path_air(
     valve, lines = valve_effects_on(fixed, effects), line_effects_on(fixed, effects)
     for j in range(LANES):
         older[j], newer[j] = min(full[j], older[j]), min(full[j], newer[j])
-    for stage in range(2):  # towards the older set-point, then towards the newer one
+    for stage in range(2):  # towards the older setpoint, then towards the newer one
         busy = 0
         for j in range(LANES):
             late = delayed_fraction((i + 1) * h, substeps / period, switch[j])

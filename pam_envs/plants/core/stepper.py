@@ -1,4 +1,4 @@
-"""Single muscles stepped set-point by set-point, with copies that predict.
+"""Single muscles stepped setpoint by setpoint, with copies that predict.
 
 The step is that of a replay: the extended plant, one sub-step a period. Plants start at rest,
 without pressure and in the virgin state.
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 class PlantBatch:
-    """Plants with one kind of hysteresis side by side, each with set-points of its own.
+    """Plants with one kind of hysteresis side by side, each with setpoints of its own.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class PlantBatch:
         if not 0.0 < period <= LONGEST_PERIOD:
             raise ValueError(
                 f"period = {period!r} s; plants are stepped with periods above 0 up to "
-                f"{LONGEST_PERIOD:g} s: hold a set-point for several of them"
+                f"{LONGEST_PERIOD:g} s: hold a setpoint for several of them"
             )
         kinds = {(plant.hysteresis.kind, plant.elements) for plant in plants}
         if len(kinds) != 1:
@@ -81,7 +81,7 @@ class PlantBatch:
         self.position = np.zeros(len(self))
 
     def run(self, set_points: ArrayLike) -> Array:
-        """Advance every plant through the control periods of set-points [Pa], shape (T, n).
+        """Advance every plant through the control periods of setpoints [Pa], shape (T, n).
 
         Returns contraction [m] and pressure [Pa] as the sensors show them, free of noise, and the
         true contraction [m], each at the end of its period: shape (3, T, n).
@@ -112,11 +112,11 @@ class PlantBatch:
 
 
 class PlantStepper:
-    """One plant, stepped set-point by set-point, with copies that predict.
+    """One plant, stepped setpoint by setpoint, with copies that predict.
 
     Parameters as of :class:`PlantBatch`; ``noise_seed`` is that of the sensors' noise, without
     which they are free of noise and steps. ``position`` is the true contraction [m],
-    ``max_pressure`` the largest set-point [Pa], ``noise`` the RMS noise [m] of the position sensor.
+    ``max_pressure`` the largest setpoint [Pa], ``noise`` the RMS noise [m] of the position sensor.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class PlantStepper:
         return float(self._one.position[0])
 
     def step(self, set_point: float) -> tuple[float, float]:
-        """Hold a set-point [Pa] for one period; return contraction [m] and pressure [Pa] read."""
+        """Hold a setpoint [Pa] for one period; return contraction [m] and pressure [Pa] read."""
         seen = self._one.run([[set_point]])
         x, p = float(seen[READING, 0, 0]), float(seen[PRESSURE, 0, 0])
         if self._noise is None:

@@ -27,14 +27,14 @@ STILL_ON = 1.0 - 1e-6
 
 @kernel
 def begin_regulated(rows: Any, fixed: Any, j: int, period: float) -> None:
-    """Regulators take their set-points as they come."""
+    """Regulators take their setpoints as they come."""
 
 
 @kernel
 def exchange_regulated(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float, work: Any
 ) -> None:
-    """Advance both pressures of a tile towards their set-points."""
+    """Advance both pressures of a tile towards their setpoints."""
     h = period / substeps
     for side in range(2):
         pressure, command = rows[K.PRESSURE_A + side], rows[K.COMMAND_A + side]
@@ -166,4 +166,4 @@ AIR: dict[str, dict[str, Any]] = {
         "settle": settle_pulsed,
     },
 }
-"""Kernels by make of valves; regulators keep their set-points where pulses end."""
+"""Kernels by make of valves; regulators keep their setpoints where pulses end."""

@@ -29,7 +29,7 @@ def at_rest(
     """
     if plant.valves != "proportional":
         raise ValueError(
-            "valves = 'on_off' take pulses and have no set-point: linearise the plant with "
+            "valves = 'on_off' take pulses and have no setpoint: linearise the plant with "
             "valves='proportional'"
         )
     pulley, link, wearer = plant.pulley, plant.link, plant.wearer

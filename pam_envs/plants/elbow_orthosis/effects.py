@@ -57,7 +57,7 @@ def effective_pressures(rows: Any, fixed: Any, side: int, h: float, work: Any) -
 def exchange_regulated(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float, work: Any
 ) -> None:
-    """Advance both pressures of a tile towards their set-points, with all effects."""
+    """Advance both pressures of a tile towards their setpoints, with all effects."""
     h = period / substeps
     for side in range(2):
         pressure = rows[K.PRESSURE_A + side]

@@ -1,6 +1,6 @@
 """An elbow orthosis with two antagonistic bundles of pneumatic muscles: chakarov2018.
 
-    set-points or pulses -> pressures -> P = X [(L_n - C) (C_max - C) - friction],  X = k0 + k1 p
+    setpoints or pulses -> pressures -> P = X [(L_n - C) (C_max - C) - friction],  X = k0 + k1 p
     Q = r (P_b - P_a),    S = -dQ/dq = -r^2 (k_a + k_b)              flexion positive
     (J_o + J_w) q'' = Q - weights + wearer
 
@@ -51,7 +51,7 @@ class ElbowOrthosis(Plant, rows=K):
     Attributes
     ----------
     valves : {"proportional", "on_off"}
-        A regulator at each bundle that takes set-points, or the paper's pair of a fill and an
+        A regulator at each bundle that takes setpoints, or the paper's pair of a fill and an
         exhaust valve, which takes pulses.
     bundle_a, bundle_b, regulator, valve, hysteresis, pulley, link, wearer
         The components; of regulator and valve the one that is not in use has no effect.

@@ -125,7 +125,7 @@ def simulate_elbow(
         Of one hysteresis, of one make of valves, and with the same sub-steps; a hysteresis map is
         the first's.
     commands : array_like, shape (T, 2) or (T, n, 2)
-        For bundles a and b, one a control period: set-points [Pa]; of on/off valves pulse widths
+        For bundles a and b, one a control period: setpoints [Pa]; of on/off valves pulse widths
         [s], filling above 0, read where a cycle begins.
     intent : array_like or tuple of three
         Intended pose of the wearer at the end of each period [rad]: a constant angle, or angle,
@@ -133,7 +133,7 @@ def simulate_elbow(
     disturbance : array_like
         Torque on the forearm [N m]; a number, (T,) or (T, n).
     pressures : tuple of array_like, optional
-        Pressures [Pa] of bundles a and b at the start; default: the first set-points, or 0 with
+        Pressures [Pa] of bundles a and b at the start; default: the first setpoints, or 0 with
         on/off valves.
     compiled : bool
         Whether kernels run as machine code.

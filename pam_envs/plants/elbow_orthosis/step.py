@@ -1,6 +1,6 @@
 """One control period of the elbow orthosis, for one environment or a tile of them.
 
-    set-points or pulses -> air -> bundles on their pulley -> forearm of a wearer
+    setpoints or pulses -> air -> bundles on their pulley -> forearm of a wearer
 
 A sub-step is exact for the torque linearised about the predicted middle, with pressures and the
 wearer's drive going straight from their old to their new values: of second order, and without a
@@ -153,7 +153,7 @@ def advance(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, substeps: int,
     period: float, work: Any,
 ) -> None:  # fmt: skip
-    """Advance a tile by one control period, towards its set-points [Pa] or pulses.
+    """Advance a tile by one control period, towards its setpoints [Pa] or pulses.
 
     They and intent and disturbance are the caller's to write. ``hysteresis`` is the first row of
     the hysteresis state; ``work`` are ``N_WORK`` rows of scratch.
@@ -284,7 +284,7 @@ def begin_lane(
 
 @kernel
 def start_regulated(rows: Any, fixed: Any, j: int) -> None:
-    """Let the set-points of one lane be its pressures."""
+    """Let the setpoints of one lane be its pressures."""
     rows[K.COMMAND_A][j], rows[K.COMMAND_A + 1][j] = (
         rows[K.PRESSURE_A][j],
         rows[K.PRESSURE_A + 1][j],

@@ -17,7 +17,7 @@ def at_rest(
     knee: float = 0.0,
     branch: Branch = "loading",
 ) -> Equilibrium:
-    """Return the equations about the rest at a set-point pressure.
+    """Return the equations about the rest at a setpoint pressure.
 
     States: pressure [Pa] (with the measured dynamics its modes instead), then angle [rad] and
     velocity [rad/s] but in the rig. On the leg the angle is that of the wire about the wearer's
@@ -27,7 +27,7 @@ def at_rest(
     Parameters
     ----------
     pressure : float
-        Set-point [Pa], reached by inflation from none.
+        Setpoint [Pa], reached by inflation from none.
     knee : float
         Flexion of the knee [rad], on the leg.
     """

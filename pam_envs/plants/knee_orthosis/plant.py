@@ -1,6 +1,6 @@
 """A power-assist knee orthosis with a McKibben muscle: yeh2010.
 
-    set-point -> regulator -> pressure P -> hysteresis -> stiffness s -> T = s (L - L_min)
+    setpoint -> regulator -> pressure P -> hysteresis -> stiffness s -> T = s (L - L_min)
     L = 2 L_b sin(theta / 2) - L_a
     tau_a = T L_b cos(theta / 2) - kappa (theta_0 - theta)              extension positive
 
@@ -87,7 +87,7 @@ class KneeOrthosis(Plant, rows=K):
     mounting : {"rig", "no_load", "leg"}
         See the module.
     dynamics : {"lag", "measured"}
-        Between set-point and pressure: the regulator's lag, with which the inverse alone tracks as
+        Between setpoint and pressure: the regulator's lag, with which the inverse alone tracks as
         published, or the published frequency response ``G_T / G_T(0)``, for which the feedback was
         designed. The paper's figures for the two exclude each other.
     activity : {"walk", "stairs_up", "stairs_down"}

@@ -1,4 +1,4 @@
-"""Rollouts of the knee orthosis, driven by given set-points, parameter sets side by side."""
+"""Rollouts of the knee orthosis, driven by given setpoints, parameter sets side by side."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ MAKE = ("hysteresis.kind", "mounting", "dynamics", "activity", "substeps")
 
 @kernel
 def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
-    """Write the set-point [Pa] of one lane."""
+    """Write the setpoint [Pa] of one lane."""
     rows[K.SET_POINT][j] = drives[0][t][column]
 
 
@@ -64,7 +64,7 @@ def advance_knee(
 
 
 def channels_of(plant: KneeOrthosis) -> dict[str, float]:
-    """Return the inputs of the orthosis, with defaults: set-point; phase and pressure at rest."""
+    """Return the inputs of the orthosis, with defaults: setpoint; phase and pressure at rest."""
     return {"set_point": 0.0, "phase": 0.0, "pressure": 0.0}
 
 
@@ -101,7 +101,7 @@ def simulate_knee(
         Of one hysteresis, mounting, regulator, activity, and with the same sub-steps; a hysteresis
         operator is that of the first.
     set_points : array_like, shape (T,) or (T, n)
-        Set-points [Pa], one a control period.
+        Setpoints [Pa], one a control period.
     phase : float
         Phase of the stride at the start, in turns.
     pressure : float

@@ -1,6 +1,6 @@
 """One control period of the knee orthosis, for one environment or a tile of them.
 
-    set-point -> regulator -> pressure -> hysteresis -> stiffness -> tension -> brace (and leg)
+    setpoint -> regulator -> pressure -> hysteresis -> stiffness -> tension -> brace (and leg)
 
 The regulator is exact at the end of a sub-step, and the hysteresis then too, where the pressure
 goes one way within a sub-step; the motion is of second order (see ``motion``).
@@ -128,7 +128,7 @@ def advance(
     rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
     substeps: int, period: float, work: Any,
 ) -> None:  # fmt: skip
-    """Advance a tile by control period ``counts[STEP]``, towards its set-points [Pa].
+    """Advance a tile by control period ``counts[STEP]``, towards its setpoints [Pa].
 
     ``gait`` is ``KneeOrthosis.gait_table()``, ``hysteresis`` the first row of the hysteresis state;
     ``work`` are ``N_WORK`` rows of scratch.

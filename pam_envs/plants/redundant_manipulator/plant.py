@@ -239,7 +239,7 @@ class RedundantManipulator(PairPlant, rows=M):
         return straight, np.array(across)
 
     def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
-        """Return the addition to set-points [rad] that bears gravity, shape (..., n).
+        """Return the addition to setpoints [rad] that bears gravity, shape (..., n).
 
         ``angles`` (..., n) [rad] are those at rest, ``payload`` (...) [kg] is at the tip.
         """
@@ -265,7 +265,7 @@ class RedundantManipulator(PairPlant, rows=M):
         return AntagonisticJoint(**same)
 
     def rest_angles(self, commands: ArrayLike, prestress: float | None = None) -> Array:
-        """Return the angles at rest [rad] of one stage after each of some set-points [rad], (T,).
+        """Return the angles at rest [rad] of one stage after each of some setpoints [rad], (T,).
 
         Quasi-static, hysteresis included, from the straight virgin state, without gravity and load.
         """

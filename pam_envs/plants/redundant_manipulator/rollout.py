@@ -98,7 +98,7 @@ def simulate_manipulator(
     Parameters
     ----------
     commands : array_like, shape (T, n)
-        Set-points [rad] of the feedforward, one row a control period.
+        Setpoints [rad] of the feedforward, one row a control period.
     prestress : float, optional
         Co-contraction [N] of every joint. Default: the plant's.
     disturbance : array_like, shape () or (n,) or (T, n)

@@ -15,7 +15,7 @@ def at_rest(
     load: float | None = None,
     branch: Branch = "loading",
 ) -> Equilibrium:
-    """Return the equations about the rest at a set-point pressure [Pa], reached from none.
+    """Return the equations about the rest at a setpoint pressure [Pa], reached from none.
 
     States: pressure [Pa], contraction [m] as measured, velocity [m/s]. Input: set_point [Pa].
     Outputs: contraction, pressure. ``load`` [kg] is by default the plant's.

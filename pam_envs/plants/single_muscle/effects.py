@@ -4,11 +4,11 @@ The plain plant is :mod:`pam_envs.plants.single_muscle.step`; this is the same s
 extended steps of the components. With all effects neutral it moves as the plain one does; a plant
 runs on it when one is not neutral. The order is that of the signal::
 
-    set-point -> dead time -> regulator, supply, leak -> line -> threshold, hysteresis, friction
+    setpoint -> dead time -> regulator, supply, leak -> line -> threshold, hysteresis, friction
     -> first cycles -> creep -> temperature -> law, load, viscosity, strands
     -> support, guide -> length creep -> mount -> sensors
 
-A set-point below zero means that the valve is shut: the muscle keeps its air but for the leak.
+A setpoint below zero means that the valve is shut: the muscle keeps its air but for the leak.
 """
 
 from __future__ import annotations
@@ -366,7 +366,7 @@ def advance_extended(
         for j in range(LANES):
             late[j] = delayed_fraction((i + 1) * h, substeps / period, switch[j])
             was[j] = drive[j]
-        for stage in range(2):  # towards the older set-point, then towards the newer one
+        for stage in range(2):  # towards the older setpoint, then towards the newer one
             busy = 0
             for j in range(LANES):
                 width[j] = h * (late[j] if stage == 1 else 1.0 - late[j])

@@ -1,6 +1,6 @@
 """A muscle that lifts a load: Festo MAS-10-N-100 of positioning2021.
 
-    set-point -> regulator -> pressure -> hysteresis -> effective pressure -> static law -> hanging
+    setpoint -> regulator -> pressure -> hysteresis -> effective pressure -> static law -> hanging
     mass
 
 The measured quantity is the contraction from the rest length under the load that hangs at the

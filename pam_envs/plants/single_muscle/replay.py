@@ -35,7 +35,7 @@ class Inputs:
     period : float
         Sampling period [s].
     command : ndarray, shape (n,)
-        Set-point [Pa] from this sample to the next; below zero: the valve is shut.
+        Setpoint [Pa] from this sample to the next; below zero: the valve is shut.
     load : ndarray, shape (n,)
         Load [kg].
     kelvin : ndarray, shape (n,)

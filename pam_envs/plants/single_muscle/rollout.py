@@ -1,4 +1,4 @@
-"""Rollouts of the single muscle, driven by given set-points, many parameter sets side by side."""
+"""Rollouts of the single muscle, driven by given setpoints, many parameter sets side by side."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ from pam_envs.plants.single_muscle.step import N_WORK, advance, rest_contraction
 
 OUTPUTS = ("contraction", "velocity", "pressure", "drive")
 COMMAND, LOAD, KELVIN, START_PRESSURE, HELD = range(5)
-"""Channels that drive a muscle: set-point [Pa], below zero with the valve shut; load [kg];
-temperature [K]; and, where it begins anew, its pressure and the set-point before [Pa]."""
+"""Channels that drive a muscle: setpoint [Pa], below zero with the valve shut; load [kg];
+temperature [K]; and, where it begins anew, its pressure and the setpoint before [Pa]."""
 N_ROWS = 0  # a placeholder
 
 
 @kernel
 def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
-    """Write set-point and load of one lane."""
+    """Write setpoint and load of one lane."""
     rows[R.SET_POINT][j] = drives[COMMAND][t][column]
     rows[R.LOAD][j] = drives[LOAD][t][column]
 
 
 @kernel
 def drive_extended(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
-    """Write set-point, load and temperature of one lane."""
+    """Write setpoint, load and temperature of one lane."""
     rows[R.SET_POINT][j] = drives[COMMAND][t][column]
     rows[R.LOAD][j] = drives[LOAD][t][column]
     rows[EFFECTS_AT + R.STATE.kelvin][j] = drives[KELVIN][t][column]
@@ -165,7 +165,7 @@ def simulate_rows(
     parameters : array, shape (n, n_parameters)
         Columns as of :meth:`SingleMuscle.parameter_rows`.
     set_points : array_like, shape (T,) or (T, n)
-        Set-points [Pa], one a control period.
+        Setpoints [Pa], one a control period.
 
     Returns
     -------

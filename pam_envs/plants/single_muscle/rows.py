@@ -1,6 +1,6 @@
 """Row numbers of the single muscle (see :mod:`pam_envs.plants.core.rows`).
 
-``REST`` to ``CHANGE`` are drawn at reset; ``HISTORY`` is the ring of the last set-points; ``TALL``
+``REST`` to ``CHANGE`` are drawn at reset; ``HISTORY`` is the ring of the last setpoints; ``TALL``
 and ``COSINE`` are derived from the muscle's diameter and braid angle.
 """
 

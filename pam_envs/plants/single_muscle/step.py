@@ -35,7 +35,7 @@ def advance(
     period: float,
     work: Any,
 ) -> None:
-    """Advance a tile by control period ``counts[STEP]``, towards its set-points."""
+    """Advance a tile by control period ``counts[STEP]``, towards its setpoints."""
     h = period / substeps
     x, v, pressure, drive = rows[R.CONTRACTION], rows[R.VELOCITY], rows[R.PRESSURE], rows[R.DRIVE]
     load, moving, damping, dead = (
@@ -81,7 +81,7 @@ def advance(
         for j in range(LANES):
             late[j] = delayed_fraction((i + 1) * h, substeps / period, switch[j])
             was[j] = drive[j]
-        for stage in range(2):  # towards the older set-point, then towards the newer one
+        for stage in range(2):  # towards the older setpoint, then towards the newer one
             busy = 0
             for j in range(LANES):
                 width[j] = h * (late[j] if stage == 1 else 1.0 - late[j])

@@ -25,7 +25,7 @@ from tests.object_digest import object_digest
 
 FREQUENCIES = np.geomspace(0.5, 60.0, 24)
 RIG = fit_rational(FREQUENCIES, 1.2 / (1.0 + 0.05j * FREQUENCIES), 1)
-"""A knee's tension over its pressure set-point, so that nothing has to be identified."""
+"""A knee's tension over its pressure setpoint, so that nothing has to be identified."""
 ENVS = (
     "PAM/MusclePositioning-v0",
     "PAM/KneeStiffness-v0",

@@ -1,6 +1,6 @@
 """The loops of an arm's joints, measured on the arm: margins, sensitivity, stability together.
 
-The responses are those of the straight arm without hysteresis to small steps of one set-point
+The responses are those of the straight arm without hysteresis to small steps of one setpoint
 after the other, which move all joints. A joint's loop is opened with the loops of all others
 closed.
 """
@@ -38,7 +38,7 @@ SECTOR = (0.65, 1.0, 1.35)
 
 @cache
 def pulses(payload: float) -> np.ndarray:
-    """Return what a set-point held for one period does, (time, angle of joint, set-point of)."""
+    """Return what a setpoint held for one period does, (time, angle of joint, setpoint of)."""
     found = np.zeros((PERIODS - 1, JOINTS, JOINTS))
     for j in range(JOINTS):
         commands = np.zeros((PERIODS, JOINTS))
@@ -50,7 +50,7 @@ def pulses(payload: float) -> np.ndarray:
 
 @cache
 def arm(payload: float) -> np.ndarray:
-    """Return the response of angles to set-points, (frequency, angle of joint, set-point of)."""
+    """Return the response of angles to setpoints, (frequency, angle of joint, setpoint of)."""
     time = PERIOD * (np.arange(PERIODS - 1) + 1.0)
     return np.einsum("wn,nij->wij", np.exp(-1j * np.outer(W, time)), pulses(payload))
 

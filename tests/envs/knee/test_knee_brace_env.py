@@ -13,7 +13,7 @@ from tests.envs.cases import record
 
 
 def series(name: str, seconds: float, pressure: float, **arguments: Any) -> dict[str, np.ndarray]:
-    """Return ``info`` as arrays under a constant set-point [Pa]."""
+    """Return ``info`` as arrays under a constant setpoint [Pa]."""
     env = gym.make(name, normalize=False, episode_seconds=60.0, **arguments)
     return record(env, [[pressure]] * round(100 * seconds))
 

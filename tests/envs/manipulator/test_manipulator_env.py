@@ -22,7 +22,7 @@ PLANT = RedundantManipulator.paper()
 LIGHT = RedundantManipulator.paper(
     chain=SerialChain.uniform(gravity=(0.0, 0.0, 0.0)), hysteresis__width=0.0
 )
-"""Without hysteresis and weight: set-points are the angles at rest."""
+"""Without hysteresis and weight: setpoints are the angles at rest."""
 
 
 def make(**arguments: Any) -> Any:
@@ -39,7 +39,7 @@ def pose(info: dict[str, float], key: str = "") -> np.ndarray:
 
 
 def follow(env: Any, seconds: float, seed: int = 0) -> list[dict[str, float]]:
-    """Return ``info`` while the set-points are the planned angles."""
+    """Return ``info`` while the setpoints are the planned angles."""
     observation, info = env.reset(seed=seed)
     infos = [dict(info)]
     for _ in range(round(100 * seconds)):

@@ -1,6 +1,6 @@
 """``Own/SpringMuscle-v0``: hold a muscle's contraction against a spring.
 
-Observation: contraction [m], pressure [Pa], reference [m] and its preview. Action: set-point of the
+Observation: contraction [m], pressure [Pa], reference [m] and its preview. Action: setpoint of the
 pressure [Pa]. Reward: ``-|contraction - reference| / 1 mm``. Start: at rest without pressure. End:
 truncated after ``episode_seconds``; terminated when the contraction exceeds 30 mm.
 """
