@@ -56,7 +56,7 @@ ENVIRONMENT = re.compile(r"^\| `(?:PAM/)?(\w+?)(?:-v\d+)?` \|", re.MULTILINE)
 def nominal_rows(page: Path) -> dict[str, list[str]]:
     """Return the cells of the first table of environments on a page, by environment."""
     text = page.read_text().partition("## Rank changes")[0].partition("## Nominal tracks")[2]
-    text = text or page.read_text().rpartition("Does a learned")[2]
+    text = text or page.read_text().rpartition("Learned controllers against")[2]
     lines = [line for line in text.splitlines() if ENVIRONMENT.match(line)]
     cells = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
     return {ENVIRONMENT.match(line)[1]: row for line, row in zip(lines, cells, strict=True)}
