@@ -81,8 +81,8 @@ def effect(unit: str, low: float, high: float, source: str) -> Any:
 def declarations(component: Any) -> dict[str, Declaration]:
     """Return the declared parameters of a component class or instance, by field name.
 
-    A class attribute ``quantity = (unit, size)`` completes declarations whose unit holds ``{}``: it
-    is put in its place, and their bounds are multiples of ``size``.
+    A class attribute ``quantity = (unit, size)`` completes declarations whose unit holds ``{}``:
+    ``unit`` takes its place, and their bounds are multiples of ``size``.
     """
     return dict(_declarations(component if isinstance(component, type) else type(component)))
 
@@ -184,7 +184,7 @@ class Signal:
         return (np.asarray(vector, np.float64)[..., self.index] - b) / a
 
     def encode(self, value: ArrayLike) -> NDArray[np.float64]:
-        """Return the vector's entry for an SI value, held within the range."""
+        """Return the vector's entry for an SI value, clipped to the range."""
         a, b = self.scale
         return a * np.clip(np.asarray(value, np.float64), self.low, self.high) + b
 

@@ -33,7 +33,7 @@ def test_the_snippets_of_the_orthosis_run_and_give_what_the_page_says(capsys):
     names = run_snippets(ROOT / "docs/knee_orthosis.md")
     said = capsys.readouterr().out
     assert "16 of 21 unknowns; k_1, k_2, k_3, k_4, k_6, k_7, k_8, k_9, k_10 stay open" in said
-    assert any("stay open" in str(one.message) for one in names["said"])
+    assert any("stay open" in str(one.message) for one in names["caught"])
     assert names["worst"](names["few"], 3.3e5) > 1.0 > 0.1 > names["worst"](names["enough"], 3.3e5)
     assert 1.5 <= names["stiffness"]["knee_inverse"] <= 2.3
     assert 10.5 <= names["stiffness"]["knee_line"] <= 11.6

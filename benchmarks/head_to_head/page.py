@@ -28,8 +28,8 @@ tools use the same recordings.
   is that of `pam_envs.diagnosis`, with the rule and thresholds of the muscle diagnosis.
 - **mujoco.sysid**: `optimize` fits mass, stiffness and damping, from the same start within the same
   bounds. *Issues* are the warnings of its own report (`AutomatedInsights`).
-- **mujoco.sysid with friction**: the same with MuJoCo's `frictionloss` as a further parameter, as
-  a user would do who suspects friction; on fewer rigs, since it takes longest.
+- **mujoco.sysid with friction**: the same with MuJoCo's `frictionloss` as a further parameter, as a
+  user who suspects friction would do; on fewer rigs, since it takes longest.
 
 `mujoco.sysid` estimates the parameters of a given model. It does not test for missing effects; this
 page measures what its report shows if a model lacks one.

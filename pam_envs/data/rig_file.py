@@ -1,14 +1,11 @@
 """Declared facts of a rig: ``RIG.yaml``.
 
-    plant: single_muscle
-    muscle: {rest_length_mm: 200, diameter_mm: 10}
-    regulator: {max_pressure_bar: 6}
-    load: hanging_mass            # or constant_force
-    sensors: {contraction_noise_mm: 0.03, pressure_noise_bar: 0.008}
-    history: {cycles_since_rest: 0, rezeroed: false}
-    repeats: [[holds_a, holds_b]] # segments that repeat one another
-    valve_closed: [shut]          # segments during which the valve is shut
-    tolerance: {mass.load: 0.02}  # what is known, and how well
+    plant: single_muscle muscle: {rest_length_mm: 200, diameter_mm: 10} regulator:
+    {max_pressure_bar: 6} load: hanging_mass            # or constant_force sensors:
+    {contraction_noise_mm: 0.03, pressure_noise_bar: 0.008} history: {cycles_since_rest: 0,
+    rezeroed: false} repeats: [[holds_a, holds_b]] # segments that repeat one another valve_closed:
+    [shut]          # segments during which the valve is shut tolerance: {mass.load: 0.02}  #
+    relative tolerance of known parameters
 
 Every key but ``plant`` may be missing.
 """
@@ -83,13 +80,13 @@ class Rig:
     rezeroed : bool
         Whether the position sensor was zeroed again at the start of each segment.
     repeats : tuple of tuple of str
-        Groups of segments in which the same was done.
+        Groups of segments with the same experiment.
     valve_closed : tuple of str
         Segments during which the valve is shut, so that the command has no effect.
     tolerance : mapping of str to float
         Plant parameters that are known, with the relative error within which they are.
     source : str
-        Where this was read.
+        Origin of the values.
     """
 
     plant: str = "single_muscle"

@@ -188,7 +188,7 @@ def one_path(table: ContractionTable) -> bool:
 
 
 def _path_fault(table: ContractionTable) -> str:
-    """Return what is wrong with the paths of a table, in a sentence, or an empty string."""
+    """Return the fault of the paths of a table in a sentence, or an empty string."""
     for load in table.loads:
         path, _ = table.cycle(load, table.repeats(load)[0])
         for repeat in table.repeats(load):

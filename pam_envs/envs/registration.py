@@ -49,5 +49,5 @@ def register_all() -> None:
 
 
 def full_id(name: str) -> str:
-    """Return an id with its namespace, which may be left out: PAM/KneeWalk-v0 of KneeWalk-v0."""
+    """Return an id with its namespace: PAM/KneeWalk-v0 for KneeWalk-v0."""
     return name if "/" in name else f"{NAMESPACE}{name}"

@@ -1,8 +1,9 @@
 """Rate-independent hysteresis as a library of its own: operators, inverses, maps, registry.
 
 Every operator is a frozen value with ``initial_state``, ``simulate`` (one history), ``step`` (rows
-of a batch) and ``scaled``; its state is handed in and out. Importing the package imports each of
-its modules, and a module registers the model that it holds (:mod:`~pam_envs.hysteresis.protocol`).
+of a batch) and ``scaled``; its state is passed in and returned. Importing the package imports each
+of its modules, and a module registers the model that it holds
+(:mod:`~pam_envs.hysteresis.protocol`).
 """
 
 from importlib import import_module as _import_module

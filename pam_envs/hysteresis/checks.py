@@ -39,7 +39,7 @@ def check_thresholds(name: str, values: tuple[float, ...], count: int, partner: 
 
 
 def check_not_negative(name: str, values: Sequence[float], why: str) -> None:
-    """Raise naming the first value below 0, and why it may not be."""
+    """Raise an error that names the first value below 0 and the reason for the bound."""
     for i, value in enumerate(values):
         if value < 0.0:
             raise ValueError(

@@ -165,7 +165,7 @@ class ParallelElements:
 
     @property
     def friction(self) -> float:
-        """Output that all elements hold together when all slip."""
+        """Sum of the outputs of all elements when all slip."""
         thresholds, gains, _ = self.parts
         return math.fsum(gains * thresholds)
 
@@ -199,7 +199,7 @@ class ParallelElements:
     def dissipated(self, before: ArrayLike, after: ArrayLike) -> Array:
         """Return the work lost between two states, ``sum(gain * threshold * abs(change))``.
 
-        The input must have moved one way in between, or not passed its last turn by enough to
+        Between the two states the input must have moved monotonically, or reversed by too little to
         move a play back. Summed over a closed cycle it is the loop area, the integral of ``x dy``
         of plays and of ``y dx`` of stops; never negative.
         """

@@ -1,7 +1,7 @@
 """Stack of dominant extrema, the state of a Preisach operator, and the recursive inverse.
 
-Of an input's history, the operator keeps the alternating extrema that no later, larger excursion
-has wiped out, each with the output reached there. In the rows of a lane
+The operator stores the alternating extrema of its input that no later, larger excursion has wiped
+out, each with the output reached there. In the rows of a lane
 
 - ``stack[0]`` is the start of the history: ``low``, where every relay is down; or, in a virgin
   history, the largest excursion so far of either sign (0 at the start, in a range ``-h..h``);
@@ -93,7 +93,7 @@ def _origin(
 def _find_turn(
     x: float, stack: Any, sums: Any, count: Any, lane: int, low: float
 ) -> tuple[int, float, float, float]:
-    """Return the points that an input keeps, and the turn, output and factor to count from."""
+    """Return the number of points that remain, and the turn, output and factor to count from."""
     n = count[lane]
     last, start = stack[n - 1][lane], stack[0][lane]
     goes_up = last > stack[max(n - 2, 0)][lane]

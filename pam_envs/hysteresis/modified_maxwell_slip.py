@@ -49,7 +49,7 @@ BREAKS, STIFFNESSES, SPRING, SEGMENT = range(4)
 
 @kernel
 def _cell(x: float, segment: float, cells: int) -> int:
-    """Return the cell of the spring that ``x`` is in, the end cells reaching on for ever."""
+    """Return the cell of the spring that contains ``x``; the end cells are unbounded."""
     last = cells - 1.0
     return int(max(0.0, min(last, x / segment)))
 
@@ -105,8 +105,8 @@ def pressure_step(
     spring : row of float, shape (m,)
         Pressures [Pa] of the spring at the stiffnesses ``0, segment, 2 segment, ...`` [N/m].
     width : float
-        Factor on the hysteresis; 0 leaves the line between the tips of the major loop and what
-        the spring departs from its own line.
+        Factor on the hysteresis; 0 leaves the line between the tips of the major loop, plus the
+        deviation of the spring from its own line.
 
     Returns
     -------
@@ -338,7 +338,7 @@ class ModifiedMaxwellSlip(ParallelElements, HysteresisModel):
     def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
         """Return the slip positions after inflation and venting, shape (*batch_shape, n).
 
-        An element that not even the whole range can make slip comes from the middle of it.
+        An element that does not slip over the whole range starts from the middle of the range.
         """
         start = np.minimum(self.break_stiffnesses, 0.5 * self.range)
         return np.broadcast_to(start, (*batch_shape, len(start))).copy()
@@ -346,7 +346,7 @@ class ModifiedMaxwellSlip(ParallelElements, HysteresisModel):
     def step(self, pressure: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
         """Return the stiffnesses [N/m] of pressures [Pa], shape (...), and the state after them.
 
-        The state holds the slip positions [N/m], shape (..., n); that given is not changed.
+        The state holds the slip positions [N/m], shape (..., n); the given state is not changed.
         """
         return self._rows(pressure, state, False)
 
@@ -422,7 +422,7 @@ def even_model(
     full_pressure, full_stiffness : float
         Pressure [Pa] and stiffness [N/m] of the major loop's upper tip; the lower one is at 0.
     friction : float
-        Pressure [Pa] that all elements hold together; below half the full pressure.
+        Pressure [Pa] of all elements together when all slip; below half the full pressure.
     elements : int
         Number of elements ``N``; the ``i``-th slips at ``i full_stiffness / (2 N)``.
     """

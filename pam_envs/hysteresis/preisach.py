@@ -71,11 +71,11 @@ class Preisach(HysteresisModel):
         Everett map at ``n >= 2`` evenly spaced inputs, antisymmetric, of relay weights that are
         nowhere negative; kept as a tuple of tuples. Interpolated bilinearly in between.
     depth : int
-        Extrema that are kept, at least 3. A turn too many drops the smallest loop.
+        Extrema that are kept, at least 3. If there are more, the smallest loop is dropped.
     start : {"low", "virgin"}
-        State at the beginning: every relay down, at ``low``; or demagnetised, at 0 in a range
-        with ``low = -high`` and a map with ``mu(a, b) = mu(-b, -a)``. For a muscle, the first is
-        one that has always been vented to ``low`` before.
+        State at the beginning: every relay down, at ``low``; or demagnetised, at 0 in a range with
+        ``low = -high`` and a map with ``mu(a, b) = mu(-b, -a)``. A muscle at ``"low"`` has always
+        been vented to ``low`` before.
     start_output : float
         Output at the beginning. 0 for a virgin start.
 
@@ -168,7 +168,7 @@ class Preisach(HysteresisModel):
     ) -> Preisach:  # fmt: skip
         """Return the operator with the Everett map of a reference model.
 
-        Of plays it is exact at the grid's inputs, and starts in their virgin state, or where they
+        For plays it is exact at the grid's inputs, and starts in their virgin state, or where they
         are after the input has come up to ``low`` from far below.
         """
         table, output = reference.everett_map(low, high, levels, start)

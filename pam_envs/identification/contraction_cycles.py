@@ -261,7 +261,7 @@ def identify_mas10(
 
 
 def _left_out_rms(table: ContractionTable, model: Callable[[Cycles, Cycles], Array]) -> float:
-    """Return the RMS error [m] on a repeat of a model of the others, and of its cycles."""
+    """Return the RMS error [m] on each repeat in turn of a model fitted to the other repeats."""
     repeats, missed = np.unique(table.repeat), []
     for held in repeats:
         others, left = mean_cycles(table, repeats[repeats != held]), mean_cycles(table, [held])

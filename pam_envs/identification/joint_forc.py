@@ -1,12 +1,12 @@
 """Test of a rig's hysteresis: Everett map, symmetry, congruency and wiping out, with a verdict.
 
-fluidic_muscles (section 3.2) drives the joint along the ascending branch, turns at chosen
-setpoints and lets it fall to negative saturation: first-order descending curves, which give the
-Everett map ``E(alpha, beta) = f_alpha - f_alphabeta`` (3.2). The printed rule for the other half,
-``f_alphabeta = -f_betaalpha``, is wrong; it is ``E(beta, alpha) = -E(alpha, beta)``.
+fluidic_muscles (section 3.2) drives the joint along the ascending branch, turns at chosen setpoints
+and lets it fall to negative saturation: first-order descending curves, which give the Everett map
+``E(alpha, beta) = f_alpha - f_alphabeta`` (3.2). The printed rule for the other half, ``f_alphabeta
+= -f_betaalpha``, is wrong; the correct rule is ``E(beta, alpha) = -E(alpha, beta)``.
 
 - *symmetry*, ``mu(a, b) = mu(-b, -a)``: the descending branches are the ascending ones turned by
-  half a turn. Two equal muscles against each other have it, a single muscle has not.
+  half a turn. Two equal antagonistic muscles are symmetric, a single muscle is not.
 - *congruency*: loops between the same two inputs are equal, whatever their history.
 - *wiping out*: a closed loop returns to where it began.
 
@@ -61,8 +61,8 @@ class JointHysteresis:
     Attributes
     ----------
     model : Preisach
-        Operator of the map: of a symmetric one made exactly so, starting virgin; of any other as
-        measured, starting at the low end.
+        Operator of the map. A symmetric map is made exactly symmetric, and the operator starts
+        virgin; any other map is used as measured, and the operator starts at the low end.
     symmetry : float
         Largest ``abs(E(a, b) - E(-b, -a))`` over the largest entry of the map.
     congruency : float

@@ -53,7 +53,7 @@ class HangingMuscle:
         return np.array(made)
 
     def _spare(self, x: float, pressure: float, middle: float, state: Any) -> float:
-        """Return by how much the muscle pulls more than its load [N]."""
+        """Return the force of the muscle in excess of its load [N]."""
         hysteresis, operator = self.plant.hysteresis, self.plant.hysteresis.operator
         friction = hysteresis.width * (hysteresis.base + hysteresis.rate * pressure)
         lag = x - middle - float(operator.step(x - middle, state)[0])  # type: ignore[union-attr]

@@ -18,8 +18,8 @@ second term of the sum repeats the first, and the two last constraints are missi
 :func:`printed_programme` keeps the mixed right-hand sides to show what they give.
 
 A major loop does not determine every ``k``: the rank of the equations is returned with the names of
-the open ones. What a loop that turns between two break points adds is below the noise and does not
-count.
+the open ones. The equations that a loop with a turn between two break points would add are below
+the noise and are not counted.
 
 References
 ----------
@@ -68,13 +68,13 @@ class SlipFit:
     Attributes
     ----------
     model : ModifiedMaxwellSlip
-        Of all best models that with the least friction.
+        Among all optimal models, the one with the least friction.
     objective, relative_objective : float
         Sum of the absolute errors at the break points [Pa], and over the largest pressure.
     rank, unknowns : int
         Rank of the equations, and ``2 N + 1``: ``k_1 .. k_N`` and ``g_0 .. g_N``.
     open : tuple of str
-        Names of the undetermined stiffnesses. ``k_N`` always is one of them: the last element never
+        Names of the undetermined stiffnesses. ``k_N`` is always one of them: the last element never
         slips, and acts as a part of the spring.
     """
 

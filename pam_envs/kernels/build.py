@@ -101,7 +101,7 @@ def address_book(arrays: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
 
 
 def threads() -> int:
-    """Return how many threads a kernel may use: ``OMP_NUM_THREADS`` bounds them, as elsewhere."""
+    """Return the number of threads that a kernel may use, at most ``OMP_NUM_THREADS``."""
     if not COMPILED:
         return 1
     from pam_envs.kernels.compiler import get_num_threads

@@ -51,7 +51,7 @@ def factors_for(
     psi_a: float,
     psi_b: float,
 ) -> tuple[float, float]:
-    """Return the factors [N/m^2] that give torque and stiffness, whatever pressures they take.
+    """Return the factors [N/m^2] that give torque and stiffness, without limits on the pressures.
 
     ``torque`` [N m], bending positive, ``stiffness`` [N m/rad], ``radius`` of the pulley [m];
     ``phi`` [m^2] and ``psi`` [m] of both bundles.

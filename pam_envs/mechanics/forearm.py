@@ -4,8 +4,8 @@
     J_o q'' = Q - w_o sin q - d q' - felt
 
 The wearer intends the motion ``q_w`` and holds the forearm there with a stiffness and a damping of
-his own; ``felt`` is the torque of the orthosis on him at cuff and handle. If the orthosis bears
-itself, ``felt`` is 0 and the intended motion is carried out exactly.
+his own; ``felt`` is the torque of the orthosis on him at cuff and handle. If ``Q`` supports and
+moves the orthosis exactly, ``felt`` is 0 and the forearm follows the intended motion exactly.
 """
 
 from __future__ import annotations

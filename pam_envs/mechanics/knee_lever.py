@@ -30,7 +30,8 @@ _GEOMETRY = "reproduces 158 N at 2 bar and 22 cm with yeh2010's range of tension
 class KneeLever(BearingEffects):
     """Geometry, spring and inertia of the brace.
 
-    ``mount_angle`` is the wire's angle at a straight knee: how the wearer straps the brace on.
+    ``mount_angle`` is the wire's angle at a straight knee; it depends on how the brace is strapped
+    on.
     """
 
     arm: float = assumed(0.14, "m", 0.05, 0.4, f"L_b; {_GEOMETRY}")

@@ -6,18 +6,19 @@ the knee flexion ``q``. The hip moves evenly, so that the knee's acceleration is
 
     tau = F_z (l sin psi - r) - F_x h - m c [a_x cos psi ... ] - I psi''
 
-is what the wearer's muscles and the orthosis bear together; Eq. (1) of yeh2010 is its first term.
-Off the natural pace the force leans less, with the square of the pace, and the centre of pressure
-stays at the heel for longer (:func:`centre_of_pressure`).
+is the torque that the wearer's muscles and the orthosis provide together; Eq. (1) of yeh2010 is its
+first term. Off the natural pace the force leans less, with the square of the pace, and the centre
+of pressure stays at the heel for longer (:func:`centre_of_pressure`).
 
-Where the orthosis pushes the wearer off his path by ``e``, he resists like a spring and a damper,
-more so the more of his weight the leg carries, and gravity on the shank helps or hinders:
+If the orthosis pushes the knee off the wearer's path by ``e``, the wearer resists like a spring and
+a damper, which are stiffer under more load on the leg; gravity on the shank acts in either
+direction:
 
     (I + I_brace) e'' = -tau_a - K e - B e' + d(gravity) e
 
 In stance this models the wearer's posture and not the bodies above the knee. Past the relaxed angle
-of the brace's wire, where no muscle can take its torque from him, he bears a share of it
-(``habituation``).
+of the brace's wire, where the pneumatic muscle cannot compensate the torque of the wire, the wearer
+bears a share of this torque (``habituation``).
 """
 
 from __future__ import annotations
@@ -75,9 +76,9 @@ def centre_of_pressure(
 
     Horizontal forces grow with the square of the pace. The ground's force points at about the
     centre of mass, or the body would tip over: at a slow walk it is almost upright and acts at the
-    heel for longer. While it drives the body ahead the centre of pressure does not move: it is at
-    the ball of the foot already, and further ahead the heel would be free under the whole body
-    weight.
+    heel for longer. While it drives the body ahead the centre of pressure does not move: it is
+    already at the ball of the foot, and further ahead the heel would be unloaded under the whole
+    body weight.
 
     ``natural`` [m], ``ground_x`` and ``ground_z`` (one unit) are those of the natural pace,
     ``quick`` the pace over it, ``aim`` the height [m] that the braking force points at (0: as

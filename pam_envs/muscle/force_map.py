@@ -41,8 +41,8 @@ PAPER_CONTRACTION = 0.25
 class ForceMap(TemperatureEffects):
     """Muscle DMSP-10-150N.
 
-    ``stretch`` lengthens the axis of contraction. Inverses of the law do not know ``gain`` and
-    ``imbalance``, which are of the specimens: muscle A pulls ``gain (1 + imbalance)`` times the
+    ``stretch`` lengthens the axis of contraction. Inverses of the law do not use ``gain`` and
+    ``imbalance``, which describe the specimens: muscle A pulls ``gain (1 + imbalance)`` times the
     law, muscle B ``gain (1 - imbalance)`` times.
     """
 
@@ -108,7 +108,7 @@ class ForceMap(TemperatureEffects):
         return (np.asarray(force, float) + self.passive(contraction)) / self.area_at(contraction)
 
     def volume(self, contraction: ArrayLike) -> NDArray[np.float64]:
-        """Return the inner volume [m3]: that whose work is the pressure's share of the force."""
+        """Return the inner volume [m3], by virtual work from the force that pressure exerts."""
         x = np.asarray(contraction, float)
         bore = 0.25 * math.pi * self.diameter**2
         grown = self.area * x * (1.0 - 0.5 * self.taper * x / self.stretch)

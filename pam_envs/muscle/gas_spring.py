@@ -46,7 +46,7 @@ class GasSpring(TemperatureEffects):
     def stiffness(self, tension: ArrayLike, length: ArrayLike) -> NDArray[np.float64]:
         """Return the stiffness ``T / dL`` [N/m] that gives a tension [N] at a length [m].
 
-        Within 0.1 mm of the shortest length that of 0.1 mm counts.
+        Within 0.1 mm of the shortest length the value at 0.1 mm is used.
         """
         stretch = np.maximum(1e-4, np.asarray(length) - self.shortest_length)
         return np.asarray(tension) / stretch
@@ -59,7 +59,7 @@ class GasSpring(TemperatureEffects):
 
 @kernel
 def stretch_of(length: float, shortest: float) -> float:
-    """Return how far the muscle is above its shortest length [m]; slack, 0."""
+    """Return the length beyond the shortest one [m]; 0 if the muscle is slack."""
     return max(0.0, length - shortest)
 
 

@@ -95,7 +95,7 @@ class QuadraticBundle(TemperatureEffects):
         return 2.0 * np.asarray(contraction, float) - self.nominal_length - self.reach
 
     def law(self, pressure: ArrayLike, contraction: ArrayLike) -> Array:
-        """Return the law's force [N], Eq. (5); it is not held above 0."""
+        """Return the law's force [N], Eq. (5); it may be negative."""
         return self.factor(pressure) * self.shape(contraction)
 
     def force(self, pressure: ArrayLike, contraction: ArrayLike) -> Array:

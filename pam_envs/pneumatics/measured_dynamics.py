@@ -33,7 +33,7 @@ MODES = REAL_MODES + 2
 class OrthosisRegulator(DelayedEffects):
     """Electronic pressure valve (SMC ITV1031): a first-order lag with a limited rate.
 
-    A plant with ``dynamics="measured"`` has the paper's frequency response in its place.
+    A plant with ``dynamics="measured"`` has the paper's frequency response instead.
     """
 
     max_pressure: float = published(4.5e5, "Pa", 1e4, 1.2e6, "yeh2010, section 5.2: of the muscle")

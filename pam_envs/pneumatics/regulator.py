@@ -111,7 +111,7 @@ class JointRegulator(DelayedEffects):
 
 @dataclass(frozen=True)
 class BundleRegulator(DelayedEffects):
-    """A closed-loop pressure regulator in the place of the paper's valves."""
+    """A closed-loop pressure regulator instead of the paper's valves."""
 
     max_pressure: float = published(6e5, "Pa", 1e4, 1.2e6, "largest: chakarov2018, section 2")
     time_constant: float = assumed(
@@ -238,7 +238,7 @@ def begin_air(rows: Any, j: int, state: int, pressure: float) -> None:
 
 @kernel
 def valve_effects_on(fixed: Any, effects: int) -> int:
-    """Return the number of lanes and effects for which the plain regulator will not do."""
+    """Return the number of lanes and effects for which the plain regulator is not sufficient."""
     return (  # type: ignore[no-any-return]
         count_on(fixed[effects + AIR.dead_band], 0.0)
         + count_on(fixed[effects + AIR.overlap], 0.0)

@@ -2,10 +2,10 @@
 
 A path is given by the joint angles of its two ends, between which each joint moves in a straight
 line; its poses are those of the arm on this line. So every path is feasible, and a plan can be
-compared with known joint angles. The figures of fluidic_muscles's example show that its ends are
-meant so, and not as ends of a straight line of the tool: the smallest angles then peak at 37.12
-degrees and the weighted ones at 27.77, as stated; along a straight line of tip and direction it
-would be 39.0 and 28.2 degrees.
+compared with known joint angles. The example of fluidic_muscles gives joint angles, not the ends of
+a straight line of the tool: with joint angles the smallest angles peak at 37.12 degrees and the
+weighted ones at 27.77, as stated; with a straight line of tip and direction at 39.0 and 28.2
+degrees.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ MOST_TRIES = 1000
 class PathEnds:
     """Joint angles [degrees] at both ends of a path, one entry a joint.
 
-    ``calibrated`` ends were searched for such that the angles peak as published: the peaks are then
-    inputs, and no evidence for results obtained with them.
+    ``calibrated`` ends were chosen so that the angles peak as published: these peaks are inputs,
+    and no evidence for results obtained with them.
     """
 
     name: str

@@ -24,7 +24,7 @@ class JointTracking:
     soft_pressure: float = assumed(6.4e5, "Pa", 0.0, 1e7, "below the largest pressure of 6.5 bar")
 
     def worst(self, largest_error: float) -> float:
-        """Return the most that a control period can cost at an error of at most this [rad]."""
+        """Return the largest cost of a control period with errors up to this one [rad]."""
         return self.tracking_weight * largest_error / self.error_scale + self.effort_weight
 
 
@@ -44,7 +44,7 @@ class PathTracking:
     soft_pressure: float = assumed(6.4e5, "Pa", 0.0, 1e7, "below the largest pressure of 6.5 bar")
 
     def worst(self, reach: float) -> float:
-        """Return the most that a control period can cost an arm of this length [m]."""
+        """Return the largest cost of a control period for an arm of this length [m]."""
         off = self.position_weight * 2.0 * reach / self.position_scale
         return off + self.pointing_weight * 2.0 / self.pointing_scale + self.effort_weight
 

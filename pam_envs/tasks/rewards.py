@@ -27,8 +27,8 @@ def effort_reward(change: float, full: float, weight: float) -> float:
 def ended_reward(ended: float, time: float, seconds: float, period: float, worst: float) -> float:
     """Return the reward for the end of an episode at a limit; 0 if ``ended`` is 0.
 
-    As if this period and all that are left of ``seconds`` had the reward ``-worst``, the lowest
-    possible one: a policy never gains by ending an episode, at any discount factor up to 1.
+    This period and all that remain of ``seconds`` count ``-worst``, the lowest possible reward, so
+    that a policy never gains by ending an episode, at any discount factor up to 1.
     """
     left = max(0.0, seconds - time) / period + 1.0
     return -worst * left if ended > 0.0 else 0.0
@@ -36,5 +36,5 @@ def ended_reward(ended: float, time: float, seconds: float, period: float, worst
 
 @kernel
 def excess(value: float, limit: float) -> float:
-    """Return by how much ``value`` exceeds ``limit``."""
+    """Return the excess of ``value`` over ``limit``, at least 0."""
     return max(0.0, value - limit)

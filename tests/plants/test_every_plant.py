@@ -163,7 +163,7 @@ def test_rows_of_a_batch_equal_the_single_plants(name: str) -> None:
 def test_plants_of_several_makes_are_refused(pair: tuple[str, ...]) -> None:
     plants = [PLANTS["maxwell_slip", name] for name in pair] + [PLANTS["none", pair[0]]]
     for other in plants[1:]:
-        with pytest.raises(ValueError, match="one make"):
+        with pytest.raises(ValueError, match="one variant"):
             RUNS[pair[0]]([plants[0], other], slice(2))
 
 

@@ -23,7 +23,7 @@ def test_the_first_of_one_make_is_returned() -> None:
 
 def test_other_makes_and_none_are_refused_by_name() -> None:
     with pytest.raises(
-        ValueError, match=r"one make \(hysteresis.kind, substeps\), got .*'preisach', 5"
+        ValueError, match=r"one variant \(hysteresis.kind, substeps\), got .*'preisach', 5"
     ):
         first_of([plant("preisach"), plant("preisach", 5)], "hysteresis.kind", "substeps")
     with pytest.raises(ValueError, match="no plants are given"):

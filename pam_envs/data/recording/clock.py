@@ -102,7 +102,7 @@ def _pace(period: float) -> list[str]:
 def _paces(
     step: Array, new: Flags, segment: Indices, segments: Sequence[str], period: float
 ) -> list[str]:
-    """Return what is wrong where segments were sampled at different rates."""
+    """Return the problems with segments sampled at different rates."""
     for i, label in enumerate(segments):
         mine = step[~new & (segment[1:] == i)]
         if len(mine) and abs(np.median(mine) / period - 1.0) > 0.2:
@@ -156,7 +156,7 @@ def _gaps(
 class Grid:
     """Even steps of time [s], shape (m,), and the rows that each is made of.
 
-    ``held`` is the row whose command, label and load is in force, ``left`` and ``right`` are those
+    ``held`` is the row whose command, label and load are in force, ``left`` and ``right`` are those
     on both sides and ``share`` is the weight of the right one. ``filled`` are steps inside a gap,
     ``missing`` rows after which single samples were missing; values were interpolated if samples
     ``moved``.

@@ -15,7 +15,7 @@ from pam_envs.wording import near
 
 Array = NDArray[np.float64]
 SHOWN = 5
-"""Most rows that a message names."""
+"""Largest number of rows that a message names."""
 
 CONVERSIONS = {
     "s": {"ms": "divide by 1000", "us": "divide by 1e6", "min": "multiply by 60"},

@@ -170,7 +170,7 @@ def _repeats(recording: Recording, rig: Rig) -> list[str]:
 
 
 def _lacks(recording: Recording, rig: Rig) -> list[str]:
-    """Return warnings on what the campaign lacks, with the consequence."""
+    """Return warnings on missing experiments and columns, with the consequence."""
     warnings = []
     levels = load_levels(recording)
     if len(levels) < 2:

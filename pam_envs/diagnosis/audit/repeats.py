@@ -28,7 +28,7 @@ class Trust:
 
     @classmethod
     def of(cls, differences: list[Array], ends: list[Array], second: int, white: float) -> Trust:
-        """Compare pieces of ``second`` samples a second; ``white`` replaces missing holds."""
+        """Compare pieces with ``second`` samples per second; ``white`` replaces missing holds."""
         squares = _mean_squares([d - d.mean() for d in differences], 2 * second)
         spread = np.nan
         if len(squares) > 1:

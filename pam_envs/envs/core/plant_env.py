@@ -182,7 +182,7 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._renderer = None
 
     def get_state(self) -> dict[str, NDArray[Any]]:
-        """Return everything that the future depends on, as arrays that own their data."""
+        """Return the complete state of the environment, as arrays that own their data."""
         seed = -1 if self._seed is None else self._seed
         return {
             **saved(self._all),

@@ -240,7 +240,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         self._renderers = []
 
     def get_state(self) -> dict[str, NDArray[Any]]:
-        """Return everything that the future depends on, as arrays that own their data."""
+        """Return the complete state of the batch, as arrays that own their data."""
         return {
             **saved(self._all),
             "last": self._last_observation.copy(),

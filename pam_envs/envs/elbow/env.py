@@ -32,8 +32,8 @@ pulse_b, -0.05 .. 0.05 s, of which one in 50 ms is taken, positive to fill; or t
 
 Reward, each control period: ``- |torque error| / 0.5 N m - 0.2 |stiffness error| / 0.5 N m/rad
 - 0.2 (change of both setpoints) / 12 bar`` (on/off valves: the last pulse widths / 0.1 s). Where a
-stop ends the episode, ``reward/ended`` adds the lowest possible reward of each remaining period, so
-that ending an episode never pays.
+  stop ends the episode, ``reward/ended`` adds the lowest possible reward of each remaining period,
+  so that a policy never gains by ending an episode.
 
 Start: at rest where the wearer holds the forearm, under the pressures for the references there
 (``start="random"``: under random pressures up to half the range). End: truncated after
@@ -217,8 +217,8 @@ def make_setup(
         Pressure regulators, or a fill and an exhaust valve for each bundle, as in the paper.
         Default: those of the plant, or proportional.
     action : {"pressures", "torque_stiffness"}
-        Two setpoints of pressure (with on/off valves: two pulse widths), or torque and stiffness,
-        which the orthosis converts to setpoints of pressure.
+        Two pressure setpoints (with on/off valves: two pulse widths), or torque and stiffness,
+        which the orthosis converts to pressure setpoints.
     motion : {"reaches", "sines", "still", "mixed"}
         Intended motion of the wearer.
     span : (float, float), optional

@@ -26,7 +26,7 @@ pressure_a_set_point and pressure_b_set_point, 0 .. 6.5e5 Pa.
 
 Reward: ``-|angle - reference| / 1 degree - 0.2 (change of both pressures' setpoints) / 13 bar``
 each control period. Where a limit ends the episode, ``reward/ended`` adds the lowest possible
-reward of each remaining period, so that ending an episode never pays.
+reward of each remaining period, so that a policy never gains by ending an episode.
 
 Start: at rest at a random angle (``start="straight"``: at 0). End: truncated after
 ``episode_seconds``; terminated beyond the joint's hard limit.

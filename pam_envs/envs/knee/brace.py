@@ -1,4 +1,4 @@
-"""``PAM/KneeTension-v0`` and ``PAM/KneeStiffness-v0``: the brace of the orthosis, not worn.
+"""``PAM/KneeTension-v0`` and ``PAM/KneeStiffness-v0``: the brace of the orthosis without a wearer.
 
 A pneumatic muscle works against the zig-zag spring of a knee brace. The action is the setpoint of
 its pressure. In ``KneeTension`` its tension has to follow a reference ("no load", yeh2010,

@@ -79,7 +79,7 @@ def set_references(rows: Any, fixed: Any, settings: Any, j: int) -> None:
 
 @kernel
 def work_of_wearer(rows: Any, fixed: Any, settings: Any, period: float, j: int) -> None:
-    """Move the calibrated activation of lane ``j``'s extensors, counted from the resting level."""
+    """Advance the calibrated activation of lane ``j``'s extensors, above the resting level."""
     demand = settings[0][L.CONFIG.demand_share] * rows[K.ESTIMATE][j]
     largest = fixed[K.ACTIVATION_LARGEST_TORQUE][j]
     risen = left_of_gap(period, fixed[K.ACTIVATION_RISE_TIME][j])

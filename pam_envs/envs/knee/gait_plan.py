@@ -1,7 +1,7 @@
 """References of the planned stride, for the preview.
 
-The plan knows the path and the pace of the wearer; of body and brace it knows the nominal
-parameters, before any is drawn.
+The plan uses the path and the pace of the wearer, and the nominal parameters of body and brace,
+before randomisation.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def planned_reference(
 def prime(rows: Any, fixed: Any, settings: Any, choices: Any, phase: float, j: int) -> float:
     """Run both low-passes of lane ``j`` over the previous stride; return their output [N m].
 
-    The previous stride was sensed and not planned: the body mass is the true one.
+    The previous stride was sensed, not planned, so that it has the true body mass.
     """
     per_step = settings[0][PERIOD] / fixed[K.STRIDE_TIME][j]
     start, torque = phase + 1000.0 - L.PRIMING * per_step, 0.0

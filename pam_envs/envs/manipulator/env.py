@@ -1,11 +1,11 @@
 """``PAM/RedundantManipulator-v0``: a hanging arm of six antagonistic joints, fluidic_muscles.
 
 Twelve pneumatic muscles bend an arm of six links about axes x, y, x, y, x, y. Its tool has to
-follow a path in position and direction: five numbers for six joints, so that the arm is redundant.
-The joint angles along the path are planned in advance, with the weight of Eq. (2.1) of the paper
-that keeps joints away from their limits, and can be observed. The action is a setpoint of each
-angle, which the static laws of the muscles convert to pressures; or all pressures. Weight, links
-and payload couple the joints.
+follow a path in position and direction: five degrees of freedom for six joints, so that the arm is
+redundant. The joint angles along the path are planned in advance, with the weight of Eq. (2.1) of
+the paper, which keeps joints away from their limits; the planned angles can be observed. The action
+is a setpoint of each angle, which the static laws of the muscles convert to pressures; or all
+pressures. Weight, links and payload couple the joints.
 
 Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``), for n
 joints counted from the base, k = 0 .. n - 1:
@@ -28,8 +28,8 @@ pressure_kb_set_point, 0 .. 6.5e5 Pa.
 
 Reward: ``-|tip - path| / 2 cm - 0.5 |direction - path's| / 2 degrees - 0.2 (change of all
 pressures' setpoints) / (2 n 6.5 bar)`` each control period. Where a limit ends the episode,
-``reward/ended`` adds the lowest possible reward of each remaining period, so that ending an episode
-never pays.
+``reward/ended`` adds the lowest possible reward of each remaining period, so that a policy never
+gains by ending an episode.
 
 Start: at the beginning of the path. End: truncated after ``episode_seconds``; terminated when a
 joint is beyond its hard limit.
@@ -155,7 +155,7 @@ def make_setup(
     payload : float, sequence of float or None
         Mass [kg] at the tip; of several, each episode draws one; None: any that the paths allow, up
         to 0.1 kg. The muscles have to hold the heaviest one, with its change, at rest in every pose
-        of the plan; with setpoints of angles, with setpoints within their range.
+        of the plan, and with ``action="angle"`` with setpoints within their range.
     payload_change : float
         Change of the payload [kg], up or down, at an unannounced time.
 

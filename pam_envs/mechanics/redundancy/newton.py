@@ -254,7 +254,7 @@ def resolve_path(
 ) -> int:  # fmt: skip
     """Find the angles for poses one after the other, each from those of the pose before.
 
-    Returns how many poses were resolved: all, or the number of the first that was not.
+    Returns the number of resolved poses, which is also the index of the first unresolved one.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""antagonistic_joint."""
+"""Antagonistic joint: a link between two pneumatic muscles."""

@@ -17,7 +17,7 @@ class UnbearableLoad(ValueError):
 def bearable_payload(plant: PairPlant, angles: ArrayLike, by_pressure: bool = False) -> float:
     """Return the largest payload [kg] that is borne at all angles (k, n) [rad]; below 0 if none is.
 
-    ``by_pressure``: pressures are set, and not angles, whose setpoints are limited.
+    ``by_pressure``: pressures are set, so that the limits of angle setpoints do not apply.
     """
     low, high = plant.torque_range(angles, by_pressure)
     empty = plant.weight_torque(angles)

@@ -1,8 +1,8 @@
 """Effects of a plant with antagonistic pairs: kernels in the place of the plain placeholders.
 
 Every muscle has the effects of its path (``core.muscle_path``), with the same parameters; the
-bearing of a single joint sticks and slips; the sensors have theirs. In the reduced plant, which
-moves by its commands, only the pressures and the sensors have effects.
+bearing of a single joint sticks and slips; each sensor has the effects of sensors. In the reduced
+plant, which moves by its commands, only the pressures and the sensors have effects.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ STUCK = 0  # placeholder: see mechanics.guide
 
 
 def pair_kernels(kind: str, layout: Any, pairs: int, effects: int | None) -> dict[str, Any]:
-    """Return what a plant with pairs puts in the place of their placeholders.
+    """Return the kernels that replace the placeholders of a plant with pairs.
 
     ``effects`` is the first row of the state of the effects; None for a plain plant.
     """

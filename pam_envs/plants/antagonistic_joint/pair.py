@@ -1,4 +1,4 @@
-"""A pair of muscles on the lever of one stage, as kernels: alone and in a chain the same."""
+"""Kernels of a pair of muscles on the lever of one stage, the same alone and in a chain."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ def advance(
 ) -> None:  # fmt: skip
     """Advance a tile by one control period, towards its setpoints [Pa].
 
-    Setpoints, disturbance [N m] and payload [kg] are the caller's to write, and the command that
-    the reduced plant follows. ``hysteresis`` is the first row of the hysteresis state, ``elements``
-    that of the plant; ``work`` are rows of scratch.
+    The caller writes setpoints, disturbance [N m], payload [kg], and the command that the reduced
+    plant follows. ``hysteresis`` is the first row of the hysteresis state, ``elements`` that of the
+    plant; ``work`` are rows of scratch.
     """
     h = period / substeps
     for i in range(substeps):
@@ -189,8 +189,8 @@ def pulled_twice(
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Return the forces [N] at two pressures, without viscosity.
 
-    Then, for the mean pressure, minus the derivative of the force by contraction [N], with what
-    sticks of the friction, and the viscosity [N s]; all is 0 where the muscle is slack.
+    Then, for the mean pressure, minus the derivative of the force by contraction [N], with the
+    sticking part of the friction, and the viscosity [N s]; all are 0 where the muscle is slack.
     """
     area, passive, less, more = terms_of(fixed, j, contraction)
     gain, middle = gain_of(fixed, j, side), 0.5 * (was + pressure)
@@ -224,7 +224,7 @@ def turning(
 
 @kernel
 def pull_of(rows: Any, fixed: Any, j: int, k: int, angle: float) -> tuple[float, float]:
-    """Return torque [N m] and stiffness [N m/rad] of the muscles of joint ``k``, and note them."""
+    """Return torque [N m] and stiffness [N m/rad] of the muscles of joint ``k``, and store them."""
     torque, stiffness = 0.0, 0.0
     for side in range(2):
         m, sign = 2 * k + side, 1.0 - 2.0 * side
@@ -292,8 +292,8 @@ def feed_forward(fixed: Any, j: int, angle: float, prestress: float) -> tuple[fl
     """Return setpoints [Pa] for an angle [rad] and a co-contraction [N]: fluidic_muscles, Fig. 4.
 
     The inverse of the law: the forces' mean is ``prestress`` and their torque 0. Where one muscle
-    would need more than full pressure the co-contraction gives way. Hysteresis, gravity, loads and
-    what sets the specimens apart are left out.
+    would need more than full pressure the co-contraction is reduced. Hysteresis, gravity, loads and
+    differences between specimens are neglected.
 
     Returns
     -------

@@ -6,7 +6,7 @@
 
 Without hysteresis, gravity and load the feedforward makes the angle at rest the commanded one; the
 regulators' lag and the damped stiffness of the muscles are then two real poles near 23 rad/s. The
-paper's reduced plant, a Preisach operator and two poles, is the make ``dynamics="reduced"``.
+paper's reduced plant, a Preisach operator and two poles, is the variant ``dynamics="reduced"``.
 
 Effects (off unless set, ``AntagonisticJoint.effects``): of both regulators and muscles, of the
 bearing and of the sensors; in the reduced plant only pressures and sensors have them.
@@ -91,7 +91,7 @@ class AntagonisticJoint(PairPlant, rows=K):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which hysteresis; both operators have the same loops.
+            Hysteresis model; both operators have the same loops.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``hysteresis__width=0.5``).
         """
@@ -104,7 +104,7 @@ class AntagonisticJoint(PairPlant, rows=K):
 
     @classmethod
     def measured(cls, hysteresis: str = "maxwell_slip", **changes: float) -> AntagonisticJoint:
-        """Return the joint with muscles as measured; what it reaches is its limit.
+        """Return the joint with muscles as measured, limited to the angle that it reaches.
 
         The limit is the angle that full pressure reaches at the nominal co-contraction, against
         the link's weight; other parameters are those of :meth:`paper`.
@@ -146,7 +146,7 @@ class AntagonisticJoint(PairPlant, rows=K):
     def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
         """Return the least and the largest torque [N m] at angles [rad].
 
-        Setpoints of angles end at their limit, and so does what they exert; pressures do not.
+        The limit of angle setpoints also limits the torque; pressure setpoints have no such limit.
         """
         if self.dynamics != "reduced":
             return super().torque_range(angles, by_pressure)
@@ -156,9 +156,9 @@ class AntagonisticJoint(PairPlant, rows=K):
         return low, high
 
     def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
-        """Return the addition to setpoints [rad] that bears gravity, shape (..., 1).
+        """Return the addition to setpoints [rad] that compensates gravity, shape (..., 1).
 
-        ``angles`` (..., 1) [rad] are those at which link and payload [kg] shall rest.
+        ``angles`` (..., 1) [rad] are those at which link and payload [kg] are to rest.
         """
         phi = np.asarray(angles, float)
         return self._shift(phi, self.weight_torque(phi, np.asarray(payload)[..., None]))

@@ -36,7 +36,7 @@ OUTPUTS = signal_rows(
 """Every signal of a record (SI) and its row of state."""
 MAKE = ("hysteresis.kind", "dynamics", "substeps")
 COMMANDED, STRESSED, DISTURBED, LOADED, FILLED_A, FILLED_B, DIRECT = range(7)
-"""Channels of what drives a record; ``DIRECT`` above 0 says that pressures are given."""
+"""Input channels of a record; ``DIRECT`` above 0 means that pressures are given."""
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def readings_of(plant: AntagonisticJoint) -> dict[str, tuple[int, int]]:
 
 
 def loop_of(plant: AntagonisticJoint, extended: bool = False, readings: bool = False) -> Loop:
-    """Return the loop of a make of the joint; ``readings``: of its sensors alone."""
+    """Return the loop of a variant of the joint; ``readings``: of its sensors alone."""
     make = plant.hysteresis.kind, plant.dynamics
     kernels = {
         "plant_drive": drive,
@@ -115,7 +115,7 @@ def simulate_joint(
     quasi_static: bool = False,
     compiled: bool = COMPILED,
 ) -> dict[str, Array]:
-    """Simulate one joint, or several of one make, from rest under the first command, free of noise.
+    """Simulate one joint, or several of one variant, from rest under the first command, noise-free.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def simulate_joint(
         Co-contraction [N] (default: the first plant's), torque [N m] and mass at the link's end
         [kg]; a number or as ``commands``.
     pressures : tuple of array_like, optional
-        Setpoints [Pa] of both muscles in the place of the feedforward's, each as ``commands``.
+        Setpoints [Pa] of both muscles instead of the feedforward's, each as ``commands``.
     quasi_static : bool
         Whether each command is held until rest (from which the next one starts) instead of for a
         control period; commands only.

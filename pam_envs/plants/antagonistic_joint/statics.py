@@ -88,8 +88,8 @@ class PairPlant(Plant):
         """Return both pressures [Pa] for an angle [rad], co-contraction [N] and torque [N m].
 
         The exact inverse of the static law, without hysteresis. Where a muscle would need more than
-        full pressure the co-contraction gives way; the last value says where even without any the
-        angle is out of reach.
+        full pressure the co-contraction is reduced; the last value marks angles that are out of
+        reach even without co-contraction.
         """
         full, total = self.regulator.max_pressure, np.asarray(torque, float)
         x = self.lever.contraction(angle, self.muscle.rest_length)
@@ -125,7 +125,7 @@ class PairPlant(Plant):
     def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
         """Return the least and the largest torque [N m] of the muscles at angles [rad].
 
-        Setpoints of angles end at their limit, and so does what they exert; pressures do not.
+        The limit of angle setpoints also limits the torque; pressure setpoints have no such limit.
         """
         a, b = np.array(self.regulator.max_pressure), np.array(0.0)
         if not by_pressure:

@@ -221,5 +221,5 @@ DYNAMICS: dict[str, dict[str, Any]] = {
 
 
 def replacements(kind: str, dynamics: str, effects: int | None = None) -> dict[str, Any]:
-    """Return the kernels of a make; ``effects``: first row of their state, None if plain."""
+    """Return the kernels of a variant; ``effects``: first row of their state, None if plain."""
     return pair_kernels(kind, K, 1, effects) | DYNAMICS[dynamics]

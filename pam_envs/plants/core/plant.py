@@ -43,7 +43,7 @@ class Plant:
     names : tuple of str
         Dotted names of the parameters that the kernels read.
     makes : mapping
-        Allowed values of each field that selects a make.
+        Allowed values of each field that selects a variant.
     choices : tuple of str
         Further keys of a file: by default the fields of ``makes``.
     effects : tuple of tuple of str
@@ -129,7 +129,7 @@ class Plant:
         return Usage(f"a {self.family}", "virgin")
 
     def _check(self) -> None:
-        """Raise if the plant cannot be built or simulated: what only a family can say."""
+        """Raise if the plant cannot be built or simulated: checks of a single family."""
 
     def check_phase(self, stiffness: float, damping: float, motion: str) -> None:
         """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``).
@@ -166,7 +166,7 @@ class Plant:
         return self.replace({name.replace("__", "."): value for name, value in changes.items()})
 
     def without_noise(self) -> Self:
-        """Return the plant with sensors that show the truth."""
+        """Return the plant with sensors that show true values."""
         return self.replace(
             {name: 0.0 for name in self.names if name.endswith((".noise", ".resolution"))}
         )
@@ -201,7 +201,7 @@ class Plant:
         return np.array([*map(self.value, self.names), *self.table_values()])
 
     def table_values(self) -> Sequence[float]:
-        """Return what follows the named parameters: the numbers of the hysteresis operator."""
+        """Return the values after the named parameters: the numbers of the hysteresis operator."""
         return self._model.numbers()
 
     @property

@@ -9,8 +9,8 @@
     ensemble: [{muscle.area: 8.8e-4, hysteresis: {...}}, ...]
     notes: {...}
 
-Everything but ``schema`` and ``family`` may be missing. Notes are free text and not hashed. Of a
-family whose plants come in several makes, the file names the choices too (``mounting: leg``).
+Everything but ``schema`` and ``family`` may be missing. Notes are free text and not hashed. For a
+family with several variants, the file also contains the choices (``mounting: leg``).
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def digest(plant: Plant) -> str:
 
 
 def write(plant: Plant, path: Path, notes: Mapping[str, Any] | None = None) -> None:
-    """Write a plant, whole or not at all."""
+    """Write a plant file atomically."""
     data = record(plant)
     if notes:
         data["notes"] = dict(notes)
@@ -123,7 +123,7 @@ def write(plant: Plant, path: Path, notes: Mapping[str, Any] | None = None) -> N
 
 
 def read(cls: type[P], path: Path) -> P:
-    """Read a plant file; every complaint names the file, the key and what to do."""
+    """Read a plant file; every error names the file, the key and the remedy."""
     try:
         with open(path, encoding="utf-8") as file:
             data = yaml.load(file, Loader=_LOADER)

@@ -44,11 +44,11 @@ def replay_plant(
     ----------
     plant : Plant
     channels : mapping
-        What drives it, by the names of the family's ``channels_of``: each a number or shape (T,).
+        Inputs, by the names of the family's ``channels_of``: each a number or shape (T,).
     period, substeps : float, int, optional
         Sampling period [s] and sub-steps of the integrator in it; default: the plant's.
     fresh : array_like of int
-        Samples at which the plant begins anew.
+        Samples at which the plant restarts.
 
     Returns
     -------
@@ -84,7 +84,7 @@ class Stepper:
         self.reset()
 
     def reset(self) -> None:
-        """Start anew: the next step begins from rest under what drives it."""
+        """Restart: the next step begins from rest under its inputs."""
         self._state, self._periods = self._loop.state(1, 1), 0
 
     def step(self, **channels: float) -> dict[str, float]:

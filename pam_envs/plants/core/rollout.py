@@ -1,7 +1,7 @@
 """One loop over control periods for rollouts, replays and single steps of every plant.
 
-A family declares its loop once (:class:`Loop`): what drives a plant, how it begins, its step and
-what comes out. :func:`run` builds the machine code for it and lays out the arrays.
+A family declares its loop once (:class:`Loop`): inputs, start, step and outputs. :func:`run` builds
+the machine code for it and lays out the arrays.
 """
 
 from __future__ import annotations
@@ -81,12 +81,12 @@ def plant_advance(
 def plant_rest(
     rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, work: Any
 ) -> None:
-    """Bring a tile to rest under what drives it: of plants that have no such kernel, do nothing."""
+    """Bring a tile to rest under its inputs; do nothing for plants without such a kernel."""
 
 
 @kernel
 def plant_rezero(rows: Any, fixed: Any) -> None:
-    """Zero the sensors of a tile: of plants that have no such kernel, do nothing."""
+    """Zero the sensors of a tile; do nothing for plants without such a kernel."""
 
 
 @kernel
@@ -139,23 +139,23 @@ def run_plants(
 
 @dataclass(frozen=True)
 class Loop:
-    """Loop of a make of plants.
+    """Loop of a variant of a plant.
 
     Attributes
     ----------
     name : str
-        Of the make and of what comes out: it names the code.
+        Name of the variant and its outputs, also of the compiled code.
     kernels : mapping
-        What takes the place of the placeholders: ``plant_drive(rows, fixed, drives, t, column, j)``
-        writes what drives lane ``j``, ``plant_begin(rows, fixed, counts, table, extra, drives, t,
-        first, elements, work)`` begins a tile, ``plant_advance(rows, fixed, counts, table, extra,
+        Replacements of the placeholders: ``plant_drive(rows, fixed, drives, t, column, j)`` writes
+        the inputs of lane ``j``, ``plant_begin(rows, fixed, counts, table, extra, drives, t, first,
+        elements, work)`` begins a tile, ``plant_advance(rows, fixed, counts, table, extra,
         elements, substeps, period, work)`` advances it; and those of the plant's step.
     outputs : sequence of int
-        Rows of the state that come out.
+        Rows of the state that are outputs.
     rows, parameters, counts, work : int
         Rows of state, parameters, whole numbers and scratch.
     extra : ndarray
-        What the step of the plant reads beside the table of its hysteresis, of two dimensions.
+        Two-dimensional table that the step reads in addition to that of the hysteresis.
     """
 
     name: str
@@ -173,7 +173,7 @@ class Loop:
         return np.zeros((tiles, self.rows, lanes)), counts
 
     def function(self, lanes: int, parallel: bool, compiled: bool) -> Callable[..., Any]:
-        """Return the loop ready to call, built once for each make and number of lanes."""
+        """Return the loop ready to call, built once for each variant and number of lanes."""
         key = (self.name, lanes, parallel, compiled)
         if key not in _BUILT:
             names = {
@@ -198,7 +198,7 @@ def loop_for(
     extended: bool, readings: Mapping[str, tuple[int, int]] | None = None, operators: int = 1,
     parameters: int | None = None, extra: Array | None = None,
 ) -> Loop:  # fmt: skip
-    """Return the loop of a make of plants, plain or extended.
+    """Return the loop of a variant of plants, plain or extended.
 
     Parameters
     ----------
@@ -210,8 +210,8 @@ def loop_for(
     outputs : iterable of int
         Rows of a rollout's signals.
     readings : mapping, optional
-        Sensors whose readings come out instead: row, counted from the first of the effects' state,
-        and row of the bias.
+        Sensors whose readings are the outputs instead: row, counted from the first of the effects'
+        state, and row of the bias.
     operators, parameters : int
         Number of its hysteresis operators; rows of parameters, by default ``layout.N_PARAMETERS``.
     """
@@ -242,7 +242,7 @@ def run(
     before: bool = False, lanes: int | None = None, parallel: bool = False,
     compiled: bool = COMPILED,
 ) -> Array:  # fmt: skip
-    """Run parameter sets of one make of plants side by side, from their beginning.
+    """Run parameter sets of one variant of plants side by side, from their beginning.
 
     Parameters
     ----------
@@ -317,7 +317,7 @@ def simulate_plants(
     signals: Iterable[str], *, single: bool, flags: ArrayLike | None = None,
     compiled: bool = COMPILED,
 ) -> dict[str, Array]:  # fmt: skip
-    """Run one plant, or several of one make, and return the signals of its loop by name.
+    """Run one plant, or several of one variant, and return the signals of its loop by name.
 
     ``single`` leaves out the last axis of shape (T, n); ``make`` are the attributes that all plants
     have in common.

@@ -23,7 +23,7 @@ def first_of(plants: Sequence[P], *words: str) -> P:
     makes = {tuple(attrgetter(word)(plant) for word in words) for plant in plants}
     if len(makes) != 1:
         raise ValueError(
-            f"plants that are simulated together need to be of one make ({', '.join(words)}), "
+            f"plants that are simulated together need to be of one variant ({', '.join(words)}), "
             f"got {makes}"
         )
     return plants[0]
@@ -32,7 +32,7 @@ def first_of(plants: Sequence[P], *words: str) -> P:
 def in_tiles(parameters: ArrayLike, plants: int, lanes: int) -> Array:
     """Return parameter sets, shape (n, n_parameters), as (tiles, n_parameters, lanes).
 
-    The last set fills up what it takes to ``plants``, and the last tile.
+    The last set is repeated up to ``plants`` columns, and to fill the last tile.
     """
     columns: NDArray[Any] = np.asarray(parameters, np.float64)
     tiles = -(-plants // lanes)

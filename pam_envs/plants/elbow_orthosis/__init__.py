@@ -1,1 +1,1 @@
-"""elbow_orthosis."""
+"""Elbow orthosis with two antagonistic bundles of muscles."""

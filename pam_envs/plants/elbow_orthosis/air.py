@@ -47,7 +47,7 @@ def exchange_regulated(
 
 @kernel
 def settle_regulated(rows: Any, fixed: Any, work: Any) -> None:
-    """Keep the pressures; what the air inside grows by comes from the supply."""
+    """Keep the pressures; the increase of the air inside comes from the supply."""
     for side in range(2):
         for j in range(LANES):
             rows[K.PRESSURE_A + side][j] = work[NOW_A + side][j]
@@ -71,7 +71,7 @@ def air_at(rows: Any, fixed: Any, j: int, side: int) -> float:
 
 @kernel
 def begin_pulsed(rows: Any, fixed: Any, j: int, period: float) -> None:
-    """Hand the coils of one lane their pulses where a cycle begins: filling above 0."""
+    """Pass pulses to the coils of one lane at the start of a cycle; positive pulses fill."""
     latches = rows[K.CLOCK][j] < 0.5 * period
     cycle = 1.0 / fixed[K.VALVE_FREQUENCY][j]
     for valve in range(K.VALVES):

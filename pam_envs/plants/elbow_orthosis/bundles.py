@@ -82,6 +82,6 @@ def volume_of(fixed: Any, j: int, side: int, contraction: float) -> float:
 
 @kernel
 def weight_of(fixed: Any, j: int, angle: float) -> float:
-    """Return the flexing torque [N m] that bears the orthosis at an angle [rad]."""
+    """Return the flexing torque [N m] that supports the orthosis at an angle [rad]."""
     sine, _ = sine_and_cosine(angle)
     return fixed[K.LINK_MASS][j] * fixed[K.LINK_CENTRE][j] * fixed[K.LINK_GRAVITY][j] * sine

@@ -8,15 +8,16 @@ each bundle
     P = X [(L_n - C) (C_max - C) - s],    s = loop L_n C_max lag / (2 largest lag)
 
 with the lag of that bundle's own contraction. ``loop`` is the largest difference of the forces
-while the bundle is stretched and let go, over its force at nominal length, at any one pressure:
-so the paper's 7.5 % is read. It was reported of loops that overload the muscles beyond their
-nominal length; shorter ones are said to have less.
+during stretch and release of the bundle, over its force at nominal length, at any one pressure.
+This is our reading of the paper's 7.5 %, which the paper reports for loops that overload the
+muscles beyond their nominal length; it says that shorter loops have less.
 
-The two presets are two hysteresis models and not one in two forms. Plays are alike wherever the
-elbow is; their thresholds are spread evenly on a logarithmic scale. The Preisach preset has
-thresholds spread evenly up to its largest, so that small motions have less slip, and less friction
-mid-stroke than towards either end, where one of the bundles is as long as it gets. No plays can do
-that. Both are assumed; the paper gives no more than the largest difference, which is the same.
+The two presets are different hysteresis models, not two forms of one. Plays act equally at every
+angle of the elbow; their thresholds are spread evenly on a logarithmic scale. The Preisach preset
+has thresholds spread evenly up to its largest, so that small motions have less slip, and less
+friction mid-stroke than towards either end, where one of the bundles is longest. Plays cannot
+represent this. Both models are assumed; the paper gives only the largest difference, which is the
+same for both.
 """
 
 from __future__ import annotations
@@ -91,8 +92,8 @@ def _density(up: NDArray[np.float64], down: NDArray[np.float64]) -> NDArray[np.f
 def travel_relays() -> Preisach:
     """Return the other preset: relays of even half-gaps, fewer mid-stroke; see this module's page.
 
-    What moves at once, without hysteresis, makes up for the relays that are missing, so that the
-    slope is 1 on the mean of both branches.
+    A part without hysteresis compensates the missing relays, so that the slope is 1 on the mean of
+    both branches.
     """
     sliding = Preisach.from_density(_density, -WIDEST, WIDEST, LEVELS).everett
     levels = np.linspace(-WIDEST, WIDEST, LEVELS)

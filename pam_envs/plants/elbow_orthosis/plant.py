@@ -89,7 +89,7 @@ class ElbowOrthosis(Plant, rows=K):
                 raise ValueError(f"{name}.muscles = {muscles:g} must be a whole number, 1 or more")
 
     def _check_range(self) -> None:
-        """Refuse a stroke that leaves the bundles no force, or the hysteresis map."""
+        """Refuse a stroke beyond the range of the bundles' force or of the hysteresis map."""
         if self.pulley.lowest >= self.pulley.highest:
             raise ValueError(
                 f"pulley.lowest = {self.pulley.lowest:g} rad is not below pulley.highest = "
@@ -118,7 +118,7 @@ class ElbowOrthosis(Plant, rows=K):
         )
 
     def _air_stiffness(self) -> float:
-        """Return how much [N m/rad] the enclosed air adds at most."""
+        """Return the largest stiffness [N m/rad] that the enclosed air adds."""
         total = 0.0
         for bundle in (self.bundle_a, self.bundle_b):
             area = bundle.pressure_factor * float(bundle.shape(0.0))
@@ -137,7 +137,7 @@ class ElbowOrthosis(Plant, rows=K):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which hysteresis: two different ones, the widest loops of which are alike.
+            Hysteresis model; the two models differ but have the same widest loop.
         valves : {"proportional", "on_off"}
             See the class.
         **changes : float
@@ -238,7 +238,7 @@ class ElbowOrthosis(Plant, rows=K):
         return self.torque(q, p_a, p_b), self.stiffness(q, p_a, p_b)
 
     def weight_torque(self, angle: ArrayLike) -> Array:
-        """Return the flexing torque [N m] that bears the orthosis at an angle [rad]."""
+        """Return the flexing torque [N m] that supports the orthosis at an angle [rad]."""
         moment = self.link.mass * self.link.centre * self.link.gravity
         return np.asarray(moment * np.sin(angle))
 

@@ -76,7 +76,7 @@ def readings_of(plant: ElbowOrthosis) -> dict[str, tuple[int, int]]:
 
 
 def loop_of(plant: ElbowOrthosis, extended: bool = False, readings: bool = False) -> Loop:
-    """Return the loop of a make of the orthosis; ``readings``: of its sensors alone."""
+    """Return the loop of a variant of the orthosis; ``readings``: of its sensors alone."""
     make = plant.hysteresis.kind, plant.valves
     kernels = {"plant_drive": drive, "plant_begin": begin, "advance": advance}
     return loop_for(
@@ -117,12 +117,12 @@ def simulate_elbow(
     pressures: tuple[ArrayLike, ArrayLike] | None = None,
     compiled: bool = COMPILED,
 ) -> dict[str, Array]:
-    """Simulate one orthosis, or several of one make, from rest, free of noise.
+    """Simulate one orthosis, or several of one variant, from rest, free of noise.
 
     Parameters
     ----------
     plants : ElbowOrthosis or sequence of them
-        Of one hysteresis, of one make of valves, and with the same sub-steps; a hysteresis map is
+        Of one hysteresis, of one kind of valves, and with the same sub-steps; a hysteresis map is
         the first's.
     commands : array_like, shape (T, 2) or (T, n, 2)
         For bundles a and b, one a control period: setpoints [Pa]; of on/off valves pulse widths
@@ -146,7 +146,7 @@ def simulate_elbow(
     Raises
     ------
     ValueError
-        If the plants are not of one make, or a shape or a value does not fit.
+        If the plants are not of one variant, or a shape or a value does not fit.
     """
     several = plants_of(plants)
     first, command = first_of(several), np.asarray(commands, np.float64)

@@ -51,7 +51,7 @@ __all__ = [
 SOFTEST = 0.1
 """Least stiffness [N m/rad] that a sub-step reckons with."""
 
-# placeholders, filled in for each hysteresis and each make of valves
+# placeholders, filled in for each hysteresis and each kind of valves
 hysteresis_lag: Any = None
 begin_period: Any = None
 exchange_air: Any = None
@@ -73,7 +73,7 @@ def pulled(
 ) -> tuple[float, float, float]:
     """Return the force of a bundle [N], and its growth with contraction [N/m] and pressure [m2].
 
-    The growth with contraction is the law's, at a held pressure; a slack bundle has none of all.
+    The growth with contraction is the law's, at a held pressure; all are 0 for a slack bundle.
     """
     shape, slope = shape_of(fixed, j, side, contraction_at(fixed, j, side, angle))
     passive, pressed = factors_of(fixed, j, side)
@@ -155,8 +155,8 @@ def advance(
 ) -> None:  # fmt: skip
     """Advance a tile by one control period, towards its setpoints [Pa] or pulses.
 
-    They and intent and disturbance are the caller's to write. ``hysteresis`` is the first row of
-    the hysteresis state; ``work`` are ``N_WORK`` rows of scratch.
+    The caller writes these, intent and disturbance. ``hysteresis`` is the first row of the
+    hysteresis state; ``work`` are ``N_WORK`` rows of scratch.
     """
     h = period / substeps
     for j in range(LANES):
@@ -209,7 +209,7 @@ def report(rows: Any, fixed: Any, j: int) -> None:
 def felt_torque(rows: Any, fixed: Any, j: int, torque: float) -> float:
     """Return the part of the bundles' torque [N m] that reaches the wearer.
 
-    The rest bears the orthosis itself and moves it, against its inertia and friction.
+    The rest supports the orthosis itself and moves it against its inertia and friction.
     """
     angle, velocity = rows[K.ANGLE][j], rows[K.VELOCITY][j]
     passive, _ = passive_torque(fixed, j, angle)
@@ -304,7 +304,7 @@ STARTS = {"proportional": start_regulated, "on_off": start_pulsed}
 
 
 def replacements(kind: str, valves: str, effects: int | None = None) -> dict[str, Any]:
-    """Return the kernels of a make; ``effects``: first row of their state, None if plain."""
+    """Return the kernels of a variant; ``effects``: first row of their state, None if plain."""
     kernels = protocol.kernels(kind) | {"start_air": STARTS[valves]}
     extended = {} if effects is None else bundle_kernels(valves, effects)
     return kernels | AIR[valves] | extended

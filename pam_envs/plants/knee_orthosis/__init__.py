@@ -1,1 +1,1 @@
-"""knee_orthosis."""
+"""Knee orthosis with one McKibben muscle."""

@@ -20,7 +20,7 @@ def at_rest(
     """Return the equations about the rest at a setpoint pressure.
 
     States: pressure [Pa] (with the measured dynamics its modes instead), then angle [rad] and
-    velocity [rad/s] but in the rig. On the leg the angle is that of the wire about the wearer's
+    velocity [rad/s], except in the rig. On the leg the angle is that of the wire about the wearer's
     path, which the wearer holds with the stiffness of the swing. Input: set_point [Pa]. Outputs:
     tension [N], torque [N m] (extension positive), pressure [Pa], and the angle.
 

@@ -1,8 +1,8 @@
 """Effects of the knee orthosis: kernels in the place of the plain plant's placeholders.
 
 The muscle has the effects of its path (those of the air only behind the regulator's lag); the
-hysteresis turns the effective pressure into stiffness. The bearing of the brace sticks and slips
-where it is alone, and all sensors have their effects.
+hysteresis turns the effective pressure into stiffness. The bearing of the brace without a leg
+sticks and slips, and all sensors have their effects.
 """
 
 from __future__ import annotations

@@ -167,7 +167,7 @@ class KneeOrthosis(Plant, rows=K):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which hysteresis; both operators have the same loops.
+            Hysteresis model; both operators have the same loops.
         dynamics : {"lag", "measured"}
             See the class.
         **changes : float

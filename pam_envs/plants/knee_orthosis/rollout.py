@@ -75,7 +75,7 @@ def readings_of(plant: KneeOrthosis) -> dict[str, tuple[int, int]]:
 
 
 def loop_of(plant: KneeOrthosis, extended: bool = False, readings: bool = False) -> Loop:
-    """Return the loop of a make of the orthosis; ``readings``: of its sensors alone."""
+    """Return the loop of a variant of the orthosis; ``readings``: of its sensors alone."""
     make = plant.hysteresis.kind, plant.mounting, plant.dynamics
     kernels = {"plant_drive": drive, "plant_begin": begin, "plant_advance": advance_knee}
     return loop_for(
@@ -93,7 +93,7 @@ def simulate_knee(
     pressure: float = 0.0,
     compiled: bool = COMPILED,
 ) -> dict[str, NDArray[np.float64]]:
-    """Simulate one plant, or several of one make, from rest, free of noise.
+    """Simulate one plant, or several of one variant, from rest, free of noise.
 
     Parameters
     ----------

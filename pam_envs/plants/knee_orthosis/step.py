@@ -182,7 +182,7 @@ REGULATORS: dict[str, dict[str, Any]] = {
 def replacements(
     kind: str, mounting: str, dynamics: str, effects: int | None = None
 ) -> dict[str, Any]:
-    """Return the kernels of a make; ``effects``: first row of their state, None if plain."""
+    """Return the kernels of a variant; ``effects``: first row of their state, None if plain."""
     kernels = hysteresis_kernels(kind) | MOTIONS[mounting] | REGULATORS[dynamics]
     if effects is None:
         return kernels

@@ -1,1 +1,1 @@
-"""redundant_manipulator."""
+"""Redundant manipulator: an arm of antagonistic joints."""

@@ -111,7 +111,7 @@ class RedundantManipulator(PairPlant, rows=M):
         super().__post_init__()
 
     def _check(self) -> None:
-        """Refuse angles out of reach, too many joints, and other than a damping for each."""
+        """Refuse angles out of reach, too many joints, and other than one damping per joint."""
         super()._check()
         if self.chain.stages > M.MOST_STAGES:
             raise ValueError(
@@ -136,7 +136,7 @@ class RedundantManipulator(PairPlant, rows=M):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which hysteresis; both operators have the same loops.
+            Hysteresis model; both operators have the same loops.
         chain : SerialChain
             Joints and links.
         **changes : float
@@ -149,11 +149,11 @@ class RedundantManipulator(PairPlant, rows=M):
     def measured(
         cls, hysteresis: str = "maxwell_slip", chain: SerialChain = LINK, **changes: float
     ) -> RedundantManipulator:
-        """Return the arm with muscles as measured; what they reach is the limit of its joints.
+        """Return the arm with muscles as measured, its joints limited to the angle that they reach.
 
         The limit is the largest angle that every joint alone reaches at the nominal co-contraction
-        within the regulators' range, against the weight of the straight arm beyond it. Bent, the
-        arm may have to bear more; what a path takes is checked when an environment is made.
+        within the regulators' range, against the weight of the straight arm beyond it. A bent arm
+        may have to bear more; the torques of a path are checked when an environment is made.
         """
         plant = cls._of(chain, hysteresis, ForceMap(), {"link.limit": REACHED}, changes)
         if "link__limit" in changes:
@@ -181,7 +181,7 @@ class RedundantManipulator(PairPlant, rows=M):
         return dataclasses.replace(plant, joint_damping=plant.even_damping())
 
     def even_damping(self) -> tuple[float, ...]:
-        """Return the damping that gives each joint a ratio of one half, the straight arm rigid."""
+        """Return the damping for a ratio of one half at each joint, the straight arm rigid."""
         pressures = self.pressures_for(0.0)[:2]
         rate = self.lever.rate(0.0)
         viscous = self.muscle.viscosity * float(np.sum(np.array(pressures) * rate**2))
@@ -195,7 +195,7 @@ class RedundantManipulator(PairPlant, rows=M):
 
     @cached_property
     def chain(self) -> SerialChain:
-        """Joints and links as heavy as they are."""
+        """Joints and links with the mass factor applied."""
         return self.nominal_chain.heavier(self.arm.mass_factor)
 
     @cached_property
@@ -213,7 +213,7 @@ class RedundantManipulator(PairPlant, rows=M):
     # --- statics --------------------------------------------------------------------------------
 
     def weight_stiffness(self, payload: float = 0.0) -> Array:
-        """Return how a joint's own angle changes its weight torque [N m/rad], arm straight."""
+        """Return each joint's slope of weight torque by its own angle [N m/rad], arm straight."""
         return self._weights_alone(payload)[1]
 
     def reachable_angle(self, prestress: float | None = None, payload: float = 0.0) -> float:
@@ -239,7 +239,7 @@ class RedundantManipulator(PairPlant, rows=M):
         return straight, np.array(across)
 
     def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
-        """Return the addition to setpoints [rad] that bears gravity, shape (..., n).
+        """Return the addition to setpoints [rad] that compensates gravity, shape (..., n).
 
         ``angles`` (..., n) [rad] are those at rest, ``payload`` (...) [kg] is at the tip.
         """

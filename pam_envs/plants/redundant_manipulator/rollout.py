@@ -71,7 +71,7 @@ def readings_of(plant: RedundantManipulator) -> dict[str, tuple[int, int]]:
 
 
 def loop_of(plant: RedundantManipulator, extended: bool = False, readings: bool = False) -> Loop:
-    """Return the loop of a make of the arm; ``readings``: of its sensors alone."""
+    """Return the loop of a variant of the arm; ``readings``: of its sensors alone."""
     make = plant.hysteresis.kind, plant.stages
     kernels = {"plant_drive": drive, "plant_begin": begin, "advance": advance}
     joints = [row + k for row in JOINT_OUTPUTS.values() for k in range(plant.stages)]

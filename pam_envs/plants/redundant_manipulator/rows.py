@@ -1,11 +1,11 @@
 """Row numbers of the redundant manipulator (see :mod:`pam_envs.plants.core.rows`).
 
-Rows of one kind are neighbours, ``ANGLE + k`` of joint ``k``, ``PRESSURE + 2 k`` of its muscle
-A and ``PRESSURE + 2 k + 1`` of its muscle B. There is room for ``MOST_STAGES`` joints, however many
-a chain has. The parameters of the muscles have the rows of those of a single joint, so that the
+Rows of one kind are neighbours, ``ANGLE + k`` of joint ``k``, ``PRESSURE + 2 k`` of its muscle A
+and ``PRESSURE + 2 k + 1`` of its muscle B. There is room for ``MOST_STAGES`` joints, however many a
+chain has. The parameters of the muscles have the rows of those of a single joint, so that the
 kernels of the pair serve both. ``MIDDLE`` and its rate are predictions, ``CHANGE`` is that of the
 velocity in a sub-step, ``SHARE`` the payload over the links' common factor; after the parameters
-follow what each joint has of damping beside ``link.damping`` [N m s/rad], and the chain's rows.
+follow the damping of each joint beside ``link.damping`` [N m s/rad], and the chain's rows.
 """
 
 from __future__ import annotations

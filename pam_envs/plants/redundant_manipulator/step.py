@@ -174,9 +174,9 @@ def begin_lane(
 
 @kernel
 def weight_bound(rows: Any, fixed: Any, j: int, k: int) -> float:
-    """Return by how much all joints together change the weight on joint ``k``, at most [N m/rad].
+    """Return a bound on the change of the weight torque of joint ``k`` by all angles [N m/rad].
 
-    Of the straight arm: what hangs beyond both joints, where their axes are not across.
+    For the straight arm: the weight beyond both joints, for joints whose axes are not orthogonal.
     """
     total = 0.0
     for i in range(N_STAGES):
@@ -236,6 +236,6 @@ def work_rows(stages: int) -> int:
 
 
 def replacements(kind: str, stages: int, effects: int | None = None) -> dict[str, Any]:
-    """Return the kernels of a make; ``effects``: first row of their state, None if plain."""
+    """Return the kernels of a variant; ``effects``: first row of their state, None if plain."""
     moves = {"N_STAGES": stages, "move": swing, "report_state": report_muscles}
     return pair_kernels(kind, M, stages, effects) | moves

@@ -1,1 +1,1 @@
-"""single_muscle."""
+"""Single muscle that lifts a hanging load."""

@@ -1,14 +1,14 @@
 """One control period of the single muscle with every effect of its components.
 
 The plain plant is :mod:`pam_envs.plants.single_muscle.step`; this is the same step composed of the
-extended steps of the components. With all effects neutral it moves as the plain one does; a plant
-runs on it when one is not neutral. The order is that of the signal::
+extended steps of the components. With all effects neutral the motion is that of the plain step; a
+plant uses the extended step when an effect is not neutral. The order is that of the signal::
 
     setpoint -> dead time -> regulator, supply, leak -> line -> threshold, hysteresis, friction
     -> first cycles -> creep -> temperature -> law, load, viscosity, strands
     -> support, guide -> length creep -> mount -> sensors
 
-A setpoint below zero means that the valve is shut: the muscle keeps its air but for the leak.
+A setpoint below zero means that the valve is shut: the muscle keeps its air except for the leak.
 """
 
 from __future__ import annotations

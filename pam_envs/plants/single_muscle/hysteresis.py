@@ -24,7 +24,7 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, Operator
 
     The pressure, stretched to a scale on which friction is uniform, passes an operator with
     hysteresis; the operator's hysteretic part is scaled by ``1 + width_per_load * load``; the
-    result is stretched back. ``operator`` is one of slope 1 that starts virgin, or None.
+    result is stretched back. ``operator`` has slope 1 and starts virgin, or is None.
     """
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (

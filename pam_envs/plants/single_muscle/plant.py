@@ -88,7 +88,7 @@ class SingleMuscle(Plant, rows=R):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Kind; each was identified on the same data.
+            Hysteresis model; each was identified on the same data.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``mass__load=4.55``).
         """

@@ -1,7 +1,7 @@
 """Replay of a recording by the single muscle, many parameter sets side by side.
 
 The step is the sampling period of the recording, load and temperature change with time, the valve
-may be shut, the muscle may begin anew, and the outputs are the readings of the sensors at the
+may be shut, the muscle may restart, and the outputs are the readings of the sensors at the
 beginning of each period.
 """
 
@@ -41,7 +41,7 @@ class Inputs:
     kelvin : ndarray, shape (n,)
         Temperature [K].
     fresh : ndarray of bool, shape (n,)
-        Samples at which the muscle begins anew from rest, the first among them.
+        Samples at which the muscle restarts from rest, including the first.
     start_pressure : ndarray, shape (n,)
         Pressure [Pa] at which it starts there.
     rezeroed : ndarray of bool, shape (n,)
@@ -67,7 +67,7 @@ class Inputs:
 
     @property
     def flags(self) -> NDArray[np.int64]:
-        """Flags of the samples: begin anew, or zero the sensor."""
+        """Flags of the samples: restart, or zero the sensor."""
         return np.where(self.fresh, BEGIN, np.where(self.rezeroed, REZERO, 0)).astype(np.int64)
 
 
@@ -135,8 +135,8 @@ def replay_rows(plant: SingleMuscle, columns: Array, inputs: Inputs) -> Array:
 def alike(columns: Array) -> list[NDArray[np.int64]]:
     """Return groups of columns to replay together, in order.
 
-    A tile does for all its lanes what one of them needs: those with the same effects go side by
-    side, and those with finer steps are a group of their own.
+    A tile computes for all its lanes what one of them needs. Columns with the same effects are
+    therefore grouped, and those with finer steps form a group of their own.
     """
     active = np.array([(columns[:, at] != off).any(axis=1) for at, off in _places()])
     order = np.lexsort(active[:-1])

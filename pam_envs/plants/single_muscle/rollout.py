@@ -134,7 +134,8 @@ def _replacements(kind: str, effects: int | None) -> dict[str, Any]:
 def loop_of(plant: SingleMuscle, extended: bool, readings: bool = False) -> Loop:
     """Return the loop of muscles with a hysteresis.
 
-    ``readings``: the readings of both sensors and the true contraction [m] come out, in long steps.
+    ``readings``: the outputs are the readings of both sensors and the true contraction [m], with
+    long sub-steps.
     """
     kind = plant.hysteresis.kind
     kernels = {"plant_drive": drive, "plant_begin": begin, "advance": advance}
