@@ -94,7 +94,7 @@ def path_muscle(
     rows: Any, fixed: Any, state: int, effects: int, warm: int, pressure: Any, h: float, crept: Any,
     factor: Any,
 ) -> None:  # fmt: skip
-    """Advance creep [Pa], and write the parts of ``(pressure + crept) factor``, the effective pressure.
+    """Advance creep [Pa], and write parts of the effective pressure, ``(pressure + crept) factor``.
 
     ``warm`` is the first row of the muscle's temperature (``WARM``), ``pressure`` are those after
     ``h`` seconds; otherwise see :func:`path_air`.
