@@ -69,7 +69,7 @@ def draw_payload(
     rows: Any, counts: Any, settings: Any, choices: Any, stream: int, number: int, change: float,
     declared: int, payload: int, j: int,
 ) -> None:  # fmt: skip
-    """Draw one of the own settings' payloads [kg] for lane ``j``, and time and size of its change.
+    """Draw a payload [kg] of the family's settings for lane ``j``, and time and size of its change.
 
     Up or down with equal probability, but up if the payload is smaller than the change.
     """
@@ -121,7 +121,7 @@ def report_pressure(
 
 @kernel
 def report_end(work: Any, config: Any, info: Any, at: Any, flag: int, broken: bool, j: int) -> None:
-    """Write whether a limit is broken to row ``flag``, and the reward for the periods left then."""
+    """Write the flag of a broken limit, and the reward for the remaining periods if it is set."""
     ended, worst = 1.0 if broken else 0.0, config[at.worst_period]
     work[flag][j] = ended
     work[info.reward_ended][j] = ended_reward(

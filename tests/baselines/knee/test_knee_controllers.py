@@ -160,7 +160,7 @@ def test_unreachable_reference_causes_no_windup():
 
 
 def jump(name: str, mismatch: float) -> tuple[float, float]:
-    """Return the tension's largest error after a switch [N], and the set-point's jump [Pa]."""
+    """Return the tension's largest error after a switch [N], and the setpoint's jump [Pa]."""
     record = walked(name, mismatch)
     starts = landings(record["sensor/stance"], 0.01)
     assert len(starts) == 1
