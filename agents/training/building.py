@@ -19,7 +19,8 @@ from agents.settings.schema import SettingsError
 from agents.vec_envs.batch import make_batch_vec_env
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
-from baselines.core.catalogue import make_controller
+from baselines.core.catalogue import CONTROLLERS, make_controller
+from pam_envs.wording import near
 
 OWN = ("learning_rate", "lstm_size", "critic_lstm", "warm_up")
 """Settings that are converted before the algorithm gets them."""
@@ -27,11 +28,14 @@ OWN = ("learning_rate", "lstm_size", "critic_lstm", "warm_up")
 
 def make_env(config: Config) -> VecEnv:
     """Return the environment of a run: batch, monitor, controller, history, normaliser."""
+    corrected, scale = config.residual.controller, config.residual.scale
+    if corrected and corrected not in CONTROLLERS:
+        hint = near(corrected, [*CONTROLLERS])
+        raise SettingsError(f"residual.controller = {corrected!r} is not known{hint}")
     kinds = config.kinds()
     rows = config.num_envs // len(kinds)
     env: VecEnv = VecMonitor(make_batch_vec_env(config.env, rows, *kinds))
     signals, actions = signals_of(env)
-    corrected, scale = config.residual.controller, config.residual.scale
     if corrected:
         made = partial(make_controller, corrected, signals=signals, action_signals=actions)
         env = ResidualVecEnv(env, corrected, made, scale)

@@ -147,6 +147,12 @@ def test_controller_at_a_limit_cannot_be_recorded() -> None:
         recording.record(ID, [{}], Stuck(), "stuck")
 
 
+def test_unknown_controller_to_correct_is_refused_with_a_hint() -> None:
+    words = "residual.controller = 'inverse_pdi' is not known; did you mean 'inverse_pid'"
+    with pytest.raises(SettingsError, match=words):
+        make_env(configs.changed(kind("residual"), ["residual.controller=inverse_pdi"]))
+
+
 # --- the presets' own controllers -------------------------------------------------------------
 
 
