@@ -111,7 +111,8 @@ class JointHysteresis:
 def measure_joint(rig: Rig, amplitude: float, levels: int = 21) -> JointHysteresis:
     """Return the hysteresis of a joint between ``-amplitude`` and ``amplitude`` [rad].
 
-    ``rig`` maps setpoints [rad] to angles at rest [rad]; see :func:`measure_hysteresis`.
+    ``rig`` maps setpoints [rad] to angles at rest [rad], each of shape (T,); ``levels`` is the
+    number of levels of the grid; see :func:`measure_hysteresis`.
     """
     return measure_hysteresis(rig, -amplitude, amplitude, levels)
 

@@ -16,6 +16,7 @@ from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
 from pam_envs.plants.core.replay import Stepper, replay_plant
+from pam_envs.plants.core.rows import dotted, each, layout
 from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
 from pam_envs.plants.elbow_orthosis.rollout import simulate_elbow
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -84,6 +85,11 @@ def test_parameter_rows_follow_their_names(key: tuple[str, str]) -> None:
     shown = [n for n in plant.names if n.endswith((".noise", ".resolution"))]
     assert len(shown) >= 4 and max(map(plant.value, shown)) > 0.0
     assert not any(map(quiet.value, shown))
+
+
+def test_equal_names_of_rows_are_refused() -> None:
+    with pytest.raises(ValueError, match="two rows are named step, link_mass: rename"):
+        layout(each("angle step link_mass"), dotted(link="mass"), {}, {})
 
 
 def drawn(low: float, high: float, *shape: int, seed: int = 0) -> Any:

@@ -62,7 +62,7 @@ class Floor:
 
 
 def noise_floor(recording: Recording, rig: Rig | None = None) -> Floor:
-    """Estimate the noise of the measured outputs."""
+    """Estimate the noise of the measured outputs, in SI, from repeats, holds or innovations."""
     rig = rig or Rig()
     declared = {"contraction": rig.contraction_noise, "pressure": rig.pressure_noise}
     return Floor(

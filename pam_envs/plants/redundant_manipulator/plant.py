@@ -8,7 +8,8 @@ hysteresis, the regulators and the feedforward of a single joint
 couple the joints. The arm hangs.
 
 Masses and damping are not published. Links of 0.1 kg are about as heavy as the muscles of a stage
-bear where the paper's paths bend the arm most, and lighter than two muscles with their fittings.
+bear where the paper's paths bend the arm most, and lighter than two muscles with their fittings,
+which have no mass in this model.
 Each joint has, beside the viscosity of its muscles, the damping that gives it a ratio of one half
 with the rest of the straight arm held rigid. Both have a common factor (``arm.mass_factor``,
 ``arm.damping_factor``) that can be drawn.
