@@ -30,7 +30,9 @@ def made(**arguments: Any) -> Any:
 
 def driven(env: Any, action: Any, steps: int, seed: int = 0) -> dict[str, np.ndarray]:
     """Return ``info`` as arrays, and the observations, under one action."""
-    return record(env, [action] * steps, seed)
+    info = record(env, [action] * steps, seed)
+    assert len(info["time"]) == steps + 1
+    return info
 
 
 def test_estimate_equals_the_law_of_the_nominal_bundles() -> None:

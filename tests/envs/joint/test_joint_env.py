@@ -30,7 +30,9 @@ def make(**arguments: Any) -> Any:
 
 def run(env: Any, action: list[float], seconds: float) -> dict[str, np.ndarray]:
     """Return ``info`` as arrays under a held action, from the reset on."""
-    return record(env, [action] * round(100 * seconds))
+    info = record(env, [action] * round(100 * seconds))
+    assert len(info["time"]) == round(100 * seconds) + 1
+    return info
 
 
 def test_angle_at_rest_equals_set_point_without_hysteresis_and_weight() -> None:
@@ -144,7 +146,7 @@ def test_payload_reduces_the_angle() -> None:
 
 
 def test_mechanical_stop_ends_the_episode() -> None:
-    info = run(make(disturbance=80.0), [0.0], 6.0)
+    info = record(make(disturbance=80.0), [[0.0]] * 600)
     broken = np.abs(info["output"]) > math.radians(35.0)
     assert len(broken) < 600
     assert broken.tolist() == [False] * (len(broken) - 1) + [True]

@@ -15,7 +15,9 @@ from tests.envs.cases import record
 def series(name: str, seconds: float, pressure: float, **arguments: Any) -> dict[str, np.ndarray]:
     """Return ``info`` as arrays under a constant setpoint [Pa]."""
     env = gym.make(name, normalize=False, episode_seconds=60.0, **arguments)
-    return record(env, [[pressure]] * round(100 * seconds))
+    info = record(env, [[pressure]] * round(100 * seconds))
+    assert len(info["time"]) == round(100 * seconds) + 1
+    return info
 
 
 @pytest.mark.parametrize(
