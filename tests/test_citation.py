@@ -37,7 +37,7 @@ def test_citation_file_is_valid(citation):
         ("licence", "MIT"),
     ],
 )
-def test_wrong_field_is_refused(citation, field, value):
+def test_invalid_citation_field_is_refused(citation, field, value):
     wrong = copy.deepcopy(citation)
     wrong[field] = value
     if value is None:

@@ -79,7 +79,7 @@ def test_film_lasts_as_long_as_the_episode(tmp_path: Path) -> None:
         (["MusclePositioning", "--reference", "stairs"], "choose one of"),
     ],
 )
-def test_mistakes_are_one_sentence(
+def test_user_errors_are_one_sentence(
     options: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["render", *options]) == 2

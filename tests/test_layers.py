@@ -52,7 +52,7 @@ def imported(program: str) -> set[str]:
 
 
 @pytest.mark.parametrize("program", [IMPORT, EPISODE, BATCH], ids=["import", "episode", "batch"])
-def test_using_the_library_loads_nothing_for_learning_or_drawing(program):
+def test_library_use_imports_no_learning_or_drawing_packages(program):
     loaded = imported(program)
     assert "pam_envs" in loaded
     assert not loaded & {*HEAVY, *OURS}

@@ -21,14 +21,14 @@ def run_snippets(page: Path) -> dict[str, object]:
     return names
 
 
-def test_the_snippets_of_the_readme_run(tmp_path, monkeypatch):
+def test_snippets_of_the_readme_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = run_snippets(ROOT / "README.md")
     assert names["rms"] < 0.5e-3  # m; what the page says of its controller
     assert (tmp_path / "slow.yaml").exists()
 
 
-def test_the_snippets_of_the_orthosis_run_and_give_what_the_page_says(capsys):
+def test_snippets_of_the_orthosis_print_the_stated_output(capsys):
     pytest.importorskip("cvxpy")
     names = run_snippets(ROOT / "docs/knee_orthosis.md")
     said = capsys.readouterr().out
@@ -44,7 +44,7 @@ def test_the_snippets_of_the_orthosis_run_and_give_what_the_page_says(capsys):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_local_links_lead_somewhere(page):
+def test_local_links_resolve(page):
     links = [link for link in LINK.findall(page.read_text()) if "://" not in link]
     missing = [link for link in links if not (page.parent / link).exists()]
     assert not missing
@@ -62,7 +62,7 @@ def nominal_rows(page: Path) -> dict[str, list[str]]:
     return {ENVIRONMENT.match(line)[1]: row for line, row in zip(lines, cells, strict=True)}
 
 
-def test_the_table_of_the_readme_is_the_board():
+def test_readme_table_equals_the_board():
     board = nominal_rows(ROOT / "benchmarks/LEADERBOARD.md")
     shown = nominal_rows(ROOT / "README.md")
     assert shown.keys() == board.keys() != set()

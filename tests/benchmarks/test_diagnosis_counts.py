@@ -26,7 +26,7 @@ def test_300_clean_rigs_without_alarm_bound_it_at_one_percent() -> None:
     assert upper_bound(1, 300) > 0.01
 
 
-def test_share_without_marks_is_none() -> None:
+def test_share_of_no_cases_is_none() -> None:
     assert share([]) == {"count": 0, "n": 0, "value": None, "interval": None, "upper": None}
     assert share([True, False, True, True])["value"] == 0.75
 
@@ -52,14 +52,14 @@ WORDS = ("right_first", "exact", "both", "wrong", "extra", "listed", "alarm")
         ("insufficient", [], [], set()),
     ],
 )
-def test_words_for_a_single_effect(
+def test_outcome_of_a_single_effect(
     verdict: str, names: list[str], others: list[str], holds: set[str]
 ) -> None:
     found = Answer.of(record(verdict=verdict, names=names, others=others))
     assert {word for word in WORDS if getattr(found, word)} == holds
 
 
-def test_words_for_two_effects() -> None:
+def test_outcome_of_two_effects() -> None:
     truth = {"creep": 2.0, "leak": 1.0}
     one = Answer.of(record("pair", truth, "named", ["leak"]))
     assert one.right_first and not (one.exact or one.both or one.wrong or one.extra)
@@ -99,7 +99,7 @@ def test_failed_run_counts_as_wrong() -> None:
 # --- counts --------------------------------------------------------------------------------------
 
 
-def test_every_count_of_a_sample() -> None:
+def test_counts_of_a_sample_are_complete() -> None:
     made = figures(sample())
     expected = {
         "right_first": (3, 5),
@@ -152,7 +152,7 @@ def test_verdicts_and_confusions_of_a_sample() -> None:
     assert ["stick_slip", "stick_slip", 1] not in confused["open"]
 
 
-def test_traces_recovery_errors_and_times_of_a_sample() -> None:
+def test_trace_errors_recovery_and_times_of_a_sample() -> None:
     made = figures(sample())
     assert made["trace"]["n"] == 3
     assert made["trace"]["median"] == pytest.approx(0.2)

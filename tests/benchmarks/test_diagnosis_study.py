@@ -55,7 +55,7 @@ def test_kinds_and_names_are_chosen_and_wrong_ones_refused() -> None:
         select(Options(fraction=0))
 
 
-def test_command_is_told_as_it_was_given() -> None:
+def test_options_reproduce_the_command_arguments() -> None:
     options = Options("tune", 3, 0.1, ("single",), ("creep", "leak"), 5, 2, True)
     assert options.arguments == (
         "--chosen tune --offset 3 --fraction 0.1 --kind single --name creep leak --limit 5 "
@@ -189,7 +189,7 @@ def deadly(case: Case, stages: Collection[str]) -> dict[str, Any]:
     return answer(case, stages)
 
 
-def test_case_that_kills_its_worker_is_failed(
+def test_case_that_kills_its_worker_is_recorded_as_failed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
@@ -248,7 +248,7 @@ def test_impossible_case_is_a_failed_record(monkeypatch: pytest.MonkeyPatch) -> 
         study(case, ("loops",))
 
 
-def test_traces_are_compared_where_the_truth_is_largest() -> None:
+def test_traces_are_compared_on_the_output_with_the_largest_effect() -> None:
     rng = np.random.default_rng(0)
     true = np.stack(
         [0.1 * NOISE[0] * rng.standard_normal(400), NOISE[1] * rng.standard_normal(400)]
@@ -286,7 +286,7 @@ def made_rig(name: str) -> Any:
 
 
 @pytest.mark.parametrize("name", ["creep", "dead_time", "sensor_delay"])
-def test_oracle_is_the_rig_that_is_driven_without_its_noise(name: str) -> None:
+def test_oracle_equals_the_driven_rig_without_noise(name: str) -> None:
     made = made_rig(name)
     rig, oracle = DrivenRig(made, 30.0, 24.0), OracleRig(made, 30.0, 24.0)
     commands = np.repeat(np.random.default_rng(0).uniform(0.0, 5e5, 6), 30)

@@ -69,7 +69,7 @@ def test_horizontal_force_is_named_at_natural_pace(natural: study.Outcome) -> No
     assert after < 1.3 * natural.problem.noise[0]
 
 
-def test_two_paces_give_the_share_to_some_percent() -> None:
+def test_two_paces_identify_the_share_within_a_few_percent() -> None:
     both = record(NATURAL_STRIDE, STRIDES, 1).and_then(record(PAPER_STRIDE, 9, 51))
     found = study.diagnose(both)
     assert found.names[0] == "horizontal_force"
@@ -102,7 +102,7 @@ def test_second_pace_removes_confusion_of_one_pace() -> None:
         ("weight_share", 1.0, "shank_weight"),
     ],
 )
-def test_nothing_else_is_called_horizontal_force(name: str, value: float, cause: str) -> None:
+def test_other_effects_are_not_named_horizontal_force(name: str, value: float, cause: str) -> None:
     found = study.diagnose(hiding(name, value))
     assert found.names == ((cause,) if cause else ())
     assert found.decision.verdict == ("named" if cause else "adequate")
@@ -118,13 +118,13 @@ def test_noise_is_separated_from_motion_and_model_error() -> None:
     assert study.white_noise(noisy, stride) == pytest.approx(1.5, rel=0.1)
 
 
-def test_recordings_of_two_legs_are_not_put_together() -> None:
+def test_recordings_of_two_legs_are_not_concatenated() -> None:
     made = record(NATURAL_STRIDE, 2)
     with pytest.raises(ValueError, match="of one leg"):
         made.and_then(replace(made, leg=replace(made.leg, body_mass=60.0)))
 
 
-def test_page_of_results_names_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_results_page_names_the_horizontal_force(capsys: pytest.CaptureFixture[str]) -> None:
     study.main(strides=12)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("1.224 s a stride: named; horizontal.share 1.0")

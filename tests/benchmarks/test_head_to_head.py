@@ -27,7 +27,7 @@ def force() -> np.ndarray:
     return campaign(SEED)
 
 
-def test_rig_moves_as_its_equation_says():
+def test_rig_satisfies_its_equation_of_motion():
     rig = Oscillator.drawn(SEED)
     force = another(SEED)[:600]
     state, found = np.zeros(2), []
@@ -72,7 +72,7 @@ def test_rig_and_candidate_agree_on_the_same_plant(force, friction, most):
     assert 0.0 < off < most  # two integrators: near, not the same
 
 
-def test_rig_shares_no_code_with_what_is_fitted_to_it():
+def test_rig_shares_no_code_with_the_fitted_model():
     tree = ast.parse(Path(mass_spring_damper_rig.__file__).read_text(encoding="utf-8"))
     names = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     names |= {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
@@ -80,7 +80,7 @@ def test_rig_shares_no_code_with_what_is_fitted_to_it():
 
 
 @pytest.mark.parametrize("cause", CAUSES, ids=lambda c: c.name)
-def test_cause_is_neutral_until_it_is_fitted(force, cause):
+def test_cause_is_neutral_before_the_fit(force, cause):
     family = MassSpringDamper(force[:3000], PERIOD, {})
     plain = family.simulate(family.column[None])
     for form in cause.forms:
@@ -115,7 +115,7 @@ def test_hidden_friction_is_named_and_clean_rig_is_adequate(force, friction):
     assert damping > 1.5  # what a refit alone makes of friction
 
 
-def test_another_effect_is_not_called_friction(force):
+def test_other_effect_is_not_named_friction(force):
     case = Case(SEED, "dead_time", head_to_head.OTHERS["dead_time"])
     found = diagnose(force, case.rig.readings(force, SEED))
     assert found.decision.verdict == "named"

@@ -175,7 +175,7 @@ def test_every_missing_column_is_named(tmp_path):
         ),
     ],
 )
-def test_odd_files_are_refused(tmp_path, text, problem):
+def test_malformed_files_are_refused(tmp_path, text, problem):
     path = tmp_path / "odd.csv"
     path.write_bytes(text.encode("latin-1"))
     assert problem in refusal(path)
@@ -226,7 +226,7 @@ def test_a_few_missing_temperatures_are_interpolated(tmp_path):
 # time
 
 
-def test_time_must_go_up_inside_a_segment(tmp_path):
+def test_time_must_increase_inside_a_segment(tmp_path):
     columns = sheet()
     columns["time_s"][20] = columns["time_s"][19]
     columns["time_s"][80] = 0.3
@@ -235,7 +235,7 @@ def test_time_must_go_up_inside_a_segment(tmp_path):
     assert "from 0.38 s to 0.38 s" in text
 
 
-def test_time_that_starts_anew_with_a_segment_restarts_the_muscle(tmp_path):
+def test_time_restart_with_a_segment_restarts_the_muscle(tmp_path):
     columns = sheet()
     columns["time_s"][50:] = columns["time_s"][:50]
     got = load_recording(write(tmp_path, columns))
@@ -358,7 +358,7 @@ def test_averaging_lowers_white_noise(tmp_path):
     assert got.contraction[1:-1].std() == pytest.approx(1e-3 / np.sqrt(10.0), rel=0.1)
 
 
-def test_runs_are_averaged_apart():
+def test_runs_are_averaged_separately():
     time = np.r_[np.arange(400), np.arange(400)] / 200.0
     value = np.repeat([1.0, 3.0], 400)
     got = Recording.from_arrays(time, value, contraction=value, segment=["a"] * 400 + ["b"] * 400)
@@ -385,7 +385,7 @@ def test_load_change_inside_a_segment_is_reported(tmp_path):
     assert got.load[[19, 20, 50]].tolist() == [25.0, 30.0, 40.0]
 
 
-def test_the_rig_must_name_segments_that_exist(tmp_path):
+def test_rig_file_must_name_existing_segments(tmp_path):
     path = write(tmp_path, sheet(101))
     assert load_recording(path, Rig(valve_closed=("b",))).valve_closed.sum() == 51
     text = refusal(path, Rig(repeats=(("a", "bb"),), valve_closed=("shut",)))
@@ -421,7 +421,7 @@ def rig_file(folder: Path, text: str) -> Path:
     return path
 
 
-def test_a_rig_file_is_read_in_si(tmp_path):
+def test_rig_file_is_converted_to_si(tmp_path):
     rig = Rig.from_yaml(rig_file(tmp_path, FULL))
     assert rig == Rig(
         plant="single_muscle",
@@ -440,7 +440,7 @@ def test_a_rig_file_is_read_in_si(tmp_path):
     assert pickle.loads(pickle.dumps(rig)) == rig
 
 
-def test_every_key_but_the_plant_is_optional(tmp_path):
+def test_every_rig_file_key_except_the_plant_is_optional(tmp_path):
     assert Rig.from_yaml(rig_file(tmp_path, "plant: single_muscle\nmuscle:\n")) == Rig()
     with pytest.raises(ValueError, match="name the plant's family"):
         Rig.from_yaml(rig_file(tmp_path, "load: hanging_mass"))
@@ -489,7 +489,7 @@ def test_wrong_rig_file_is_refused_with_a_remedy(tmp_path, line, problem):
         (None, "cannot be read"),
     ],
 )
-def test_a_file_that_is_no_rig_is_refused(tmp_path, text, problem):
+def test_file_that_is_not_a_rig_file_is_refused(tmp_path, text, problem):
     path = tmp_path / "none.yaml" if text is None else rig_file(tmp_path, text)
     with pytest.raises(ValueError, match=problem):
         Rig.from_yaml(path)
@@ -536,7 +536,7 @@ def block(language: str, place: int = 0) -> str:
     return PAGE.read_text(encoding="utf-8").split(f"```{language}\n")[1 + place].split("```")[0]
 
 
-def test_the_examples_of_the_page_are_read(tmp_path):
+def test_examples_of_the_page_are_readable(tmp_path):
     assert Rig.from_yaml(rig_file(tmp_path, block("yaml"))) == Rig(
         rest_length=0.2,
         diameter=0.01,
@@ -556,7 +556,7 @@ def test_the_examples_of_the_page_are_read(tmp_path):
     assert readings.cycle(2.55, 1)[0].tolist() == [0.0, 5e4, 0.0]
 
 
-def test_the_page_names_every_column_and_key():
+def test_page_names_every_column_and_key():
     page = PAGE.read_text(encoding="utf-8")
     assert all(f"| `{name}` |" in page for name in COLUMNS)
     assert all(f"{key}:" in block("yaml") for key in KEYS)

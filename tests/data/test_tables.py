@@ -34,12 +34,12 @@ def test_table_has_375_readings_of_three_loads_and_five_cycles(table):
     assert tables.one_path(table)
 
 
-def test_values_are_si(table):
+def test_table_values_are_in_si(table):
     assert table.pressure_pa.max() == 6e5
     assert table.contraction_m.max() == pytest.approx(15.3e-3)
 
 
-def test_a_cycle_goes_up_to_6_bar_and_back_in_half_bars(table):
+def test_cycle_rises_to_6_bar_and_returns_in_half_bar_steps(table):
     up = np.arange(0.0, 6.01, 0.5) * 1e5
     for load in table.loads:
         pressure, contraction = table.cycle(load, 3)
@@ -82,14 +82,14 @@ def test_only_the_unloaded_muscle_drifts_over_the_repeats(table):
     assert max(map(abs, rates[1:])) < 0.01e-3
 
 
-def test_a_heavier_load_is_lifted_less(table):
+def test_heavier_load_contracts_less(table):
     """Averaged over a branch; single cells at 5.5 bar say otherwise by 0.3 mm, see PROVENANCE."""
     for inflating in (True, False):
         lifted = [table.branch(load, inflating)[1].mean() for load in table.loads]
         assert lifted[0] > lifted[1] + 0.2e-3 > lifted[2] + 0.4e-3
 
 
-def test_leaving_a_repeat_out_leaves_the_others(table):
+def test_leaving_out_a_repeat_keeps_the_others(table):
     rest = table.without_repeat(2)
     assert rest.repeats(4.55) == (1, 3, 4, 5)
     np.testing.assert_array_equal(rest.cycle(4.55, 5)[1], table.cycle(4.55, 5)[1])
@@ -109,7 +109,7 @@ def test_unknown_load_or_cycle_is_refused_with_the_known_ones(table):
         table.cycle(0.0, 6)
 
 
-def test_a_file_of_ones_own_is_read_in_any_order_of_its_cycles(tmp_path):
+def test_users_file_is_read_with_cycles_in_any_order(tmp_path):
     second = ["0,inflation,0,2,0", "0,inflation,1,2,1.1", "0,deflation,0,2,0.4"]
     mixed = [row for pair in zip(second, CYCLE, strict=True) for row in pair]
     table = load_contraction_table(_file(tmp_path, *mixed))
@@ -134,7 +134,7 @@ def test_byte_order_mark_and_blank_lines_are_accepted(tmp_path):
         ("0,rising,1,1,1", "direction", "rising", "write inflating or deflating"),
     ],
 )
-def test_a_bad_cell_is_refused_with_its_place(tmp_path, row, column, value, fault):
+def test_bad_cell_is_refused_with_its_location(tmp_path, row, column, value, fault):
     path = _file(tmp_path, CYCLE[0], row, CYCLE[2])
     with pytest.raises(ValueError) as caught:
         load_contraction_table(path)
@@ -159,7 +159,7 @@ def test_table_without_full_cycles_is_refused(tmp_path, rows, fault):
         load_contraction_table(_file(tmp_path, *rows))
 
 
-def test_the_shipped_table_names_its_source():
+def test_shipped_table_names_its_source():
     text = (Path(tables.__file__).parent / "PROVENANCE.md").read_text(encoding="utf-8")
     assert "Precise Positioning Systems" in text
     for path in Path(tables.__file__).parent.iterdir():

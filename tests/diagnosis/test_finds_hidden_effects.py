@@ -94,7 +94,7 @@ def test_clean_rig_is_adequate(case: Case, records: Records) -> None:
 
 @compiled
 @pytest.mark.parametrize("case", FAINT, ids=lambda case: case.names[0])
-def test_effect_below_noise_gives_no_wrong_name(case: Case, records: Records) -> None:
+def test_effect_below_noise_is_not_misnamed(case: Case, records: Records) -> None:
     found = records[case]
     assert found["failure"] is None
     assert found["verdict"] in ("adequate", "named", "ambiguous")
@@ -134,7 +134,7 @@ def test_effect_outside_catalogue_is_unexplained(records: Records) -> None:
     assert found["verdict"] == "unexplained"
 
 
-def test_one_process_makes_the_sample(request: pytest.FixtureRequest) -> None:
+def test_sample_is_computed_in_one_process(request: pytest.FixtureRequest) -> None:
     if not request.config.getoption("loadgroup", False):
         pytest.skip("the tests are not spread over processes by group")
     assert request.node.nodeid.endswith("@hidden effects")

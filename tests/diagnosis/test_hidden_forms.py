@@ -238,7 +238,7 @@ def test_tray_and_scale_errors_increase_with_load():
         assert more(load) == pytest.approx(p.tray * (hung + 0.2 * load / 30.0))
 
 
-def test_without_a_load_a_tray_only_rubs(short):
+def test_tray_without_load_has_a_small_effect(short):
     base, effect = _base(), _effect("payload_error")
     idle = dataclasses.replace(short, load_N=np.zeros_like(short.load_N))
     shown, clean = (hidden.simulate(base, hide, idle) for hide in ([(effect, 4.0)], []))
@@ -250,7 +250,7 @@ def test_without_a_load_a_tray_only_rubs(short):
     assert 0.0 < rms(shown, clean) < 0.25 * rms(loaded, expected)
 
 
-def test_eyrings_drag_is_the_arsinh_of_the_speed():
+def test_eyring_drag_is_the_arsinh_of_the_speed():
     effect = _effect("viscous_loss", pace=0.5)
     p, s = _rig(effect, 3.0)
     pace = np.array([1e-5, 0.2, 1.0, 10.0, 100.0])

@@ -156,7 +156,7 @@ def check_batch(name: str, alone: list[float]) -> None:
     assert found == alone
 
 
-def test_rows_inverse_undoes_the_model(toy: Any) -> None:
+def test_row_wise_inverse_cancels_the_model(toy: Any) -> None:
     rows = toy.Backlash(0.3).rows()
     state = rows.initial(2)
     for x in ([0.0, 0.5], [1.0, -0.8], [0.2, 0.1]):

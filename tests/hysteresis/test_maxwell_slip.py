@@ -90,13 +90,13 @@ def test_return_point_hysteresis_is_exact(operator, history, part):
 
 @few
 @given(plays(), histories)
-def test_larger_excursion_wipes_out(operator, history):
+def test_larger_excursion_wipes_out_smaller_ones(operator, history):
     assert wiping_error(exact(operator), operator.initial_state(), history) == 0.0
 
 
 @few
 @given(plays(), histories, st.integers(2, 7))
-def test_speed_and_stops_on_the_way_change_nothing(operator, history, splits):
+def test_output_is_rate_independent(operator, history, splits):
     assert refinement_error(exact(operator), operator.initial_state(), history, splits) == 0.0
 
 
@@ -144,7 +144,7 @@ def test_minor_loops_are_congruent(operator, one, other, a, b):
 
 @few
 @given(st.one_of(plays(), slips()), histories, histories)
-def test_inverse_undoes_the_operator_in_the_middle_of_a_history(operator, first, second):
+def test_inverse_cancels_the_operator_at_any_history(operator, first, second):
     inverse = operator.inverse()
     _, state = operator.simulate(first)
     y, _ = operator.simulate(second, state)
@@ -154,7 +154,7 @@ def test_inverse_undoes_the_operator_in_the_middle_of_a_history(operator, first,
 
 @few
 @given(st.one_of(plays(), slips()), histories, histories)
-def test_operator_undoes_its_inverse(operator, first, second):
+def test_operator_cancels_its_inverse(operator, first, second):
     inverse = operator.inverse()
     _, state = inverse.simulate(first)
     x, _ = inverse.simulate(second, state)
@@ -164,7 +164,7 @@ def test_operator_undoes_its_inverse(operator, first, second):
 
 @few
 @given(st.one_of(plays(), slips()), histories)
-def test_states_and_parameters_come_back_from_the_inverse(operator, history):
+def test_inverse_round_trips_states_and_parameters(operator, history):
     inverse = operator.inverse()
     again = inverse.inverse()
     _, state = operator.simulate(history)
@@ -174,7 +174,7 @@ def test_states_and_parameters_come_back_from_the_inverse(operator, history):
     assert again.total_slope == pytest.approx(operator.total_slope, rel=1e-12)
 
 
-def test_a_play_without_width_belongs_to_the_line():
+def test_play_without_width_is_part_of_the_line():
     operator = PlayOperator((0.0, 0.5), (0.3, 0.4), 0.0)
     x = np.array([0.2, 1.5, -0.7, 0.4, 0.1, 2.0])
     y, state = operator.simulate(x)

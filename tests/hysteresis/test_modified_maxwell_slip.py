@@ -26,7 +26,7 @@ models = st.sampled_from([RIG, BENT, RIG.scaled(0.4), even_model(3e5, 5000.0, 0.
 
 @few
 @given(models, pressures, pressures)
-def test_inverse_undoes_the_model_in_the_middle_of_a_history(model, first, second):
+def test_inverse_cancels_the_model_at_any_history(model, first, second):
     _, state = model.simulate(first)
     stiffness, end = model.simulate(second, state)
     back, same = model.inverse_simulate(stiffness, state)
@@ -36,7 +36,7 @@ def test_inverse_undoes_the_model_in_the_middle_of_a_history(model, first, secon
 
 @few
 @given(models, pressures, st.lists(st.floats(-500.0, 8000.0), min_size=1, max_size=12))
-def test_model_undoes_its_inverse(model, first, stiffnesses):
+def test_model_cancels_its_inverse(model, first, stiffnesses):
     _, state = model.simulate(first)
     pressure, _ = model.inverse_simulate(stiffnesses, state)
     np.testing.assert_allclose(model.simulate(pressure, state)[0], stiffnesses, rtol=0.0, atol=1e-8)
@@ -44,7 +44,7 @@ def test_model_undoes_its_inverse(model, first, stiffnesses):
 
 @few
 @given(models, pressures, st.integers(2, 7))
-def test_stops_on_the_way_change_nothing(model, history, splits):
+def test_intermediate_stops_change_nothing(model, history, splits):
     ends = zip([0.0, *history], history, strict=False)
     fine = [v for a, b in ends for v in [*np.linspace(a, b, splits)[1:-1], b]]
     np.testing.assert_allclose(
@@ -54,12 +54,12 @@ def test_stops_on_the_way_change_nothing(model, history, splits):
 
 @few
 @given(models, st.floats(0.0, 4e5), st.floats(0.0, 4e5))
-def test_a_closed_excursion_returns_to_its_turn(model, turn, away):
+def test_closed_excursion_returns_to_its_reversal_point(model, turn, away):
     stiffness, _ = model.simulate([4.5e5, turn, away if away > turn else turn, turn])
     assert stiffness[3] == pytest.approx(stiffness[1], abs=1e-7)
 
 
-def test_a_vented_loop_is_the_major_loop():
+def test_loop_down_to_zero_pressure_is_the_major_loop():
     stiffness, state = RIG.simulate([0.0, 4.5e5, 0.0])
     np.testing.assert_allclose(stiffness, [0.0, 7110.0, 0.0], atol=1e-8)
     np.testing.assert_allclose(state, RIG.initial_state(), atol=1e-8)
@@ -70,7 +70,7 @@ def test_loop_is_about_15_percent_wide_at_mid_pressure():
     assert (falling - rising) / 7110.0 == pytest.approx(0.15, abs=0.01)
 
 
-def test_with_a_straight_spring_it_is_the_maxwell_slip_model():
+def test_linear_spring_gives_the_maxwell_slip_model():
     breaks, stiffnesses, spring, segment = RIG.arrays
     straight = (spring[-1] - spring[0]) / (segment * (len(spring) - 1))
     plain = MaxwellSlip(straight, tuple(stiffnesses), tuple(breaks))
@@ -101,7 +101,7 @@ def test_width_scales_the_loop_between_the_same_tips(width):
     assert scaled == pytest.approx(width * full, abs=1e-6)
 
 
-def test_kernels_take_the_width_as_scaled_does():
+def test_kernels_scale_the_width_like_scaled():
     path = [1e5, 4e5, 2e5, 3e5]
     state = [[w] for w in RIG.initial_state()]
     ours = [stiffness_step(p, state, 0, *RIG.arrays, 0.3) for p in path]
@@ -121,7 +121,7 @@ def test_batch_gives_the_bits_of_single_histories():
         np.testing.assert_array_equal(end, last)
 
 
-def test_not_a_number_leaves_the_state_unchanged():
+def test_nan_input_leaves_the_state_unchanged():
     state = RIG.simulate([3e5])[1]
     stiffness, after = RIG.step(np.nan, state)
     assert np.isnan(stiffness)

@@ -118,7 +118,7 @@ def dominant_extrema(history: list[float]) -> tuple[list[float], list[float]]:
 
 @few
 @given(operators(), histories)
-def test_textbook_sum_over_dominant_extrema(operator, history):
+def test_output_equals_the_sum_over_dominant_extrema(operator, history):
     """Eq. (3.3) with the first-order curve values f, L_0 = low and f(u, u) = f(u)."""
     operator = Preisach(LOW, HIGH, operator.table, 40)
     cells = operator.inverse_cell
@@ -155,7 +155,7 @@ def test_return_point_hysteresis_is_exact(operator, history, part):
 
 @few
 @given(operators(), histories, inputs)
-def test_larger_excursion_wipes_out(operator, history, last):
+def test_larger_excursion_wipes_out_smaller_ones(operator, history, last):
     largest = max(map(abs, history))
     through, hysteresis = operator.simulate([largest, -largest, *history, largest, last])
     without, short = operator.simulate([largest, -largest, largest, last])
@@ -168,7 +168,7 @@ def test_larger_excursion_wipes_out(operator, history, last):
 
 @few
 @given(operators(), histories, st.integers(2, 7))
-def test_speed_and_stops_on_the_way_change_nothing(operator, history, splits):
+def test_output_is_rate_independent(operator, history, splits):
     y, hysteresis = operator.simulate(history)
     fine = [history[0], history[0]]
     for a, b in pairwise(history):
@@ -219,7 +219,7 @@ def test_full_loop_dissipates():
 SHRINKING = [0.9 * (-0.8) ** k for k in range(8)]
 
 
-def test_full_stack_drops_the_smallest_loop_only():
+def test_full_stack_drops_only_the_smallest_loop():
     weights = np.tril(np.ones((CELLS, CELLS)))
     deep = Preisach.from_weights(weights, LOW, HIGH, 40)
     shallow = Preisach.from_weights(weights, LOW, HIGH, 6)
@@ -247,13 +247,13 @@ def test_full_stack_gives_no_jump(weights, history):
 
 @few
 @given(operators(), st.lists(st.floats(-5.0, 5.0), min_size=1, max_size=14))
-def test_beyond_the_range_counts_as_its_end(operator, history):
+def test_input_beyond_the_range_is_clipped_to_it(operator, history):
     y, _ = operator.simulate(history)
     held, _ = operator.simulate(np.clip(history, LOW, HIGH))
     np.testing.assert_allclose(y, held, atol=1e-12 * scale(operator))
 
 
-def test_starts_with_its_start_output():
+def test_initial_output_is_the_start_output():
     weights = np.tril(np.ones((CELLS, CELLS)))
     low = Preisach.from_weights(weights, 0.0, 6e5, start_output=0.25)
     assert low.simulate([0.0])[0][0] == 0.25
@@ -276,7 +276,7 @@ def invert(operator: Preisach, y: Array, state: PreisachState) -> Array:
 
 @few
 @given(operators(), histories, histories)
-def test_inverse_undoes_the_operator_in_the_middle_of_a_history(operator, first, second):
+def test_inverse_cancels_the_operator_at_any_history(operator, first, second):
     _, state = operator.simulate(first)
     y, _ = operator.simulate(second, state)
     np.testing.assert_allclose(invert(operator, y, state), second, rtol=0.0, atol=1e-9)
@@ -284,7 +284,7 @@ def test_inverse_undoes_the_operator_in_the_middle_of_a_history(operator, first,
 
 @few
 @given(operators(), st.lists(st.floats(0.0, 1.0), min_size=1, max_size=14))
-def test_operator_undoes_its_inverse(operator, parts):
+def test_operator_cancels_its_inverse(operator, parts):
     ends, _ = operator.simulate([HIGH, LOW])
     outputs = ends[1] + np.array(parts) * (ends[0] - ends[1])
     x = invert(operator, outputs, operator.initial_state())
@@ -297,7 +297,7 @@ distinct = st.lists(st.integers(0, 1000), min_size=2, max_size=20, unique=True)
 
 @few
 @given(relay_weights(), distinct)
-def test_inverse_with_a_full_stack(weights, numbers):
+def test_inverse_is_exact_with_a_full_stack(weights, numbers):
     # no two turns so near that rounding decides which of them is wiped out
     history = LOW + (HIGH - LOW) * np.array(numbers) / 1000
     operator = Preisach.from_weights(weights, LOW, HIGH, 4)
@@ -307,7 +307,7 @@ def test_inverse_with_a_full_stack(weights, numbers):
 
 @few
 @given(operators(), histories)
-def test_inverse_step_leaves_the_state_of_a_step(operator, history):
+def test_inverse_step_leaves_the_same_state_as_a_step(operator, history):
     y, hysteresis = operator.simulate(history)
     state = operator.initial_state()
     for value in y:
@@ -316,7 +316,7 @@ def test_inverse_step_leaves_the_state_of_a_step(operator, history):
     np.testing.assert_allclose(again, operator.simulate(SHRINKING, hysteresis)[0], atol=1e-9)
 
 
-def test_out_of_reach_gives_the_end_of_the_range():
+def test_output_out_of_reach_gives_the_end_of_the_range():
     operator = Preisach.from_weights(np.tril(np.ones((CELLS, CELLS))), LOW, HIGH)
     x = invert(operator, np.array([1e3, -1e3]), operator.initial_state())
     np.testing.assert_allclose(x, [HIGH, LOW])
@@ -367,7 +367,7 @@ def of_difference(a: Array, b: Array) -> Array:
 
 
 @pytest.mark.parametrize("reversals", range(4))
-def test_recursion_is_exact_and_inverted_map_only_up_to_one_reversal(reversals):
+def test_recursion_is_exact_and_inverted_map_up_to_one_reversal(reversals):
     operator = Preisach.from_density(inhomogeneous, LOW, HIGH, 33).plus_linear(0.5)
     assert symmetry_error(operator.table) < 1e-12
     series, recursion = worst_inverses(operator, reversals)

@@ -37,7 +37,7 @@ def test_shipped_plant_equals_the_identified_plant(
 
 
 @pytest.mark.parametrize("kind", ["maxwell_slip", "preisach"])
-def test_loop_widths_come_out_within_a_third_of_a_millimetre(
+def test_fitted_loop_widths_agree_within_a_third_of_a_millimetre(
     kind: str, fits: dict[str, cc.CyclesFit]
 ) -> None:
     pressures, measured, model = fits[kind].widths()
@@ -46,7 +46,7 @@ def test_loop_widths_come_out_within_a_third_of_a_millimetre(
     assert np.abs(model - measured).max() < 0.3e-3
 
 
-def test_residuals_are_near_the_repeatability_of_the_readings(
+def test_fit_residuals_are_near_the_repeatability_of_the_readings(
     fits: dict[str, cc.CyclesFit],
 ) -> None:
     floor = cc.repeatability_floor(TABLE)
@@ -68,7 +68,7 @@ def test_every_member_of_the_ensemble_fits_about_as_well() -> None:
         assert len(drives) == len(members)  # equally good, and different
 
 
-def test_rank_names_parameters_that_the_tables_leave_open(fits: dict[str, cc.CyclesFit]) -> None:
+def test_rank_reveals_unidentifiable_parameters(fits: dict[str, cc.CyclesFit]) -> None:
     found = cc.identifiability(fits["maxwell_slip"])
     fixed = dict(zip(found.names, found.fixed, strict=True))
     assert found.rank < len(found.names)

@@ -194,7 +194,7 @@ def test_noise_on_a_random_record_averages_out():
     assert np.sqrt(np.mean((fitted - clean) ** 2)) < 0.25 * sigma
 
 
-def test_one_loop_leaves_the_rest_to_the_prior():
+def test_single_loop_leaves_the_remaining_weights_at_the_prior():
     play = PlayOperator((0.25, 0.5), (0.5, 0.3), 0.4)
     truth = Preisach.resembling(play, -1.0, 1.0, LEVELS)
     grid = np.linspace(-1.0, 1.0, 65)
@@ -246,7 +246,7 @@ def test_congruency_error_allows_for_other_samples():
     assert congruency_error(records) < 0.01
 
 
-def test_symmetry_error_sees_noise_and_bias():
+def test_symmetry_error_responds_to_noise_and_bias():
     even = Preisach.from_density(lambda a, b: 1.0 + (a + b) ** 2, -1.0, 1.0, LEVELS)
     x = curve_inputs(-1.0, 1.0, LEVELS, 2)
     y = even.simulate(x)[0]

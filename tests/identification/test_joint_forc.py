@@ -58,14 +58,14 @@ def test_asymmetric_preisach_operator_fails_the_symmetry_alone():
     np.testing.assert_allclose(made.weights, made.weights[::-1, ::-1].T, atol=1e-15)
 
 
-def test_output_behind_a_bent_curve_is_not_congruent():
+def test_output_after_a_nonlinear_curve_is_not_congruent():
     hysteresis = assumed_hysteresis()
     found = measure_joint(lambda u: np.exp(6.0 * hysteresis.simulate(u)[0]), RANGE)
     assert found.congruency > 0.1
     assert found.verdict.startswith("fails as a Preisach operator")
 
 
-def test_output_that_creeps_does_not_wipe_out():
+def test_output_with_creep_has_no_wiping_out():
     hysteresis = assumed_hysteresis()
 
     def rig(inputs):

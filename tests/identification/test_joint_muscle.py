@@ -34,7 +34,7 @@ def test_joints_pass_with_either_hysteresis_and_unequal_muscles_do_not() -> None
     assert not measure_joint(uneven.rest_angles, uneven.angle_range[1]).symmetric
 
 
-def test_muscle_at_rest_carries_its_load() -> None:
+def test_muscle_at_rest_balances_its_load() -> None:
     """Force of the law less friction, computed with separate plays."""
     joint = AntagonisticJoint.paper()
     operator, hysteresis = joint.hysteresis.operator, joint.hysteresis

@@ -83,7 +83,7 @@ def test_major_loop_alone_fits_itself_and_mispredicts_other_loops():
     assert errors[1] > 0.01
 
 
-def test_too_few_loops_warn_with_the_open_unknowns():
+def test_too_few_loops_warn_with_the_number_of_unidentified_unknowns():
     with pytest.warns(OpenParameters, match=r"16 of 21 unknowns; .*k_9, k_10 stay open") as caught:
         fit_slip_programme([loop(10)])
     assert "minor loop" in str(caught[0].message)

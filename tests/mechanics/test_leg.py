@@ -83,7 +83,7 @@ def test_gravity_stiffness_is_the_slope_of_the_shank_torque() -> None:
         assert made == pytest.approx(-slope, abs=1e-6)
 
 
-def test_ground_force_points_at_one_place_at_every_pace() -> None:
+def test_ground_force_passes_through_one_point_at_every_pace() -> None:
     aim, x, z, natural = 1.0, -0.06, 1.0, 0.03
     for quick in (0.25, 0.6, 1.0, 1.2):
         cop = centre_of_pressure(natural, x, z, quick, aim, -0.2, 0.4)

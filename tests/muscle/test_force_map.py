@@ -14,7 +14,7 @@ LAWS = (ForceMap(), ForceMap(stretch=paper_stretch()))
 CONTRACTIONS = np.linspace(-0.02, 0.25, 28)
 
 
-def test_law_meets_the_measured_map() -> None:
+def test_force_law_fits_the_measured_map() -> None:
     data = measured_map()
     assert len(data.force) == 85 and data.force.max() == pytest.approx(542.5)
     errors = data.residuals(ForceMap())

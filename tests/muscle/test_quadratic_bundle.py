@@ -32,7 +32,7 @@ def test_factors_equal_equation_6_as_read() -> None:
         assert 1e3 * bundle(n).pressure_factor == pytest.approx(-0.21 + 4.41 * n)
 
 
-def test_k1_as_printed_makes_up_to_four_muscles_push() -> None:
+def test_k1_as_printed_gives_negative_force_for_up_to_four_muscles() -> None:
     forces = [float(printed(n).law(4e5, 0.0)) for n in NUMBERS]
     assert forces[:4] == pytest.approx([-319.0, -214.0, -110.0, -5.0], abs=0.5)
     assert min(forces[4:]) > 0.0

@@ -1,4 +1,4 @@
-"""The antagonistic joint at rest: virtual work, symmetry, feed-forward, reach, loops, files."""
+"""The antagonistic joint at rest: virtual work, symmetry, feedforward, reach, loops, files."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_forces_have_the_given_co_contraction_and_torque(
     assert np.allclose(plant.torque(angles, p_a, p_b), np.broadcast_to(torques, a.shape), atol=1e-9)
 
 
-# --- feed-forward and reach ----------------------------------------------------------------------
+# --- feedforward and reach ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("plant", MADE)
@@ -143,7 +143,7 @@ def test_the_measured_joint_is_limited_by_preload_weight_and_pressure() -> None:
     assert max(plant.muscle.pressure(np.array([a, b]), x)) == pytest.approx(6.5e5, rel=1e-9)
 
 
-def test_weights_are_borne_after_the_shift() -> None:
+def test_gravity_shift_compensates_the_weight() -> None:
     plant = AntagonisticJoint.paper("none")
     angles = np.radians([[-20.0], [5.0], [18.0]])
     commands = angles + plant.gravity_shift(angles, np.array([0.0, 0.5, 0.2]))
@@ -152,7 +152,7 @@ def test_weights_are_borne_after_the_shift() -> None:
         assert float(rests[0]) == pytest.approx(float(angle[0]), abs=1e-9)
 
 
-def test_more_co_contraction_makes_this_lever_softer() -> None:
+def test_co_contraction_reduces_the_stiffness_of_this_lever() -> None:
     """The muscles' lengths do not add up to a constant: equal forces buckle the joint."""
     stiffness = [float(AntagonisticJoint.paper("none").stiffness_at(0.0, f)) for f in (20, 50, 120)]
     assert stiffness == pytest.approx([16.1, 14.8, 11.6], abs=0.05)
@@ -199,7 +199,7 @@ def test_the_joints_loop_is_symmetric_and_a_muscles_is_not() -> None:
     assert np.abs(there + back - middle).max() > 0.2 * (there.max() - there.min())
 
 
-def test_friction_takes_at_most_the_hysteresis_of_the_data_sheet() -> None:
+def test_friction_is_at_most_the_data_sheets_hysteresis() -> None:
     """3 % of the nominal length at constant force, at any pressure (fluidic_muscles, sec. 1.1)."""
     plant, plays = AntagonisticJoint.paper(), contraction_plays()
     lag = sum(w * t for w, t in zip(plays.weights, plays.thresholds, strict=True))

@@ -17,7 +17,7 @@ MAKES = (AntagonisticJoint.paper("none"), AntagonisticJoint.reduced("none"))
 
 
 @pytest.mark.parametrize("plant", MAKES)
-def test_the_largest_set_point_holds_what_is_bearable_and_no_more(plant: AntagonisticJoint) -> None:
+def test_largest_setpoint_holds_exactly_the_bearable_payload(plant: AntagonisticJoint) -> None:
     angle = math.radians(24.0)
     most = bearable_payload(plant, [[angle]])
     assert 0.5 < most < 10.0
@@ -26,7 +26,7 @@ def test_the_largest_set_point_holds_what_is_bearable_and_no_more(plant: Antagon
         assert (made["angle"][0] < angle) == less
 
 
-def test_free_pressures_bear_no_less() -> None:
+def test_free_pressures_bear_more_payload() -> None:
     plant, angles = AntagonisticJoint.measured("none"), np.array([[0.0], [0.2], [-0.35]])
     least, largest = plant.torque_range(angles)
     lowest, highest = plant.torque_range(angles, by_pressure=True)
@@ -35,7 +35,7 @@ def test_free_pressures_bear_no_less() -> None:
     assert np.allclose(highest, plant.torque(angles, 6.5e5, 0.0))
 
 
-def test_an_arm_bears_what_its_weakest_joint_bears() -> None:
+def test_bearable_payload_of_an_arm_is_that_of_its_weakest_joint() -> None:
     arm = RedundantManipulator.paper("none")
     bent = np.radians([[5.0, -4.0, -26.0, 3.0, -8.0, 6.0], [4.0, -3.0, -20.0, 3.0, -7.0, 6.0]])
     most = bearable_payload(arm, bent)
@@ -49,7 +49,7 @@ def test_an_arm_bears_what_its_weakest_joint_bears() -> None:
     assert np.allclose(np.where(held < 0.0, least, largest), weight, atol=1e-6)
 
 
-def test_nothing_is_borne_where_the_empty_arm_is_not() -> None:
+def test_bearable_payload_is_negative_if_the_empty_arm_is_unbearable() -> None:
     heavy = RedundantManipulator.paper("none", arm__mass_factor=5.0)
     bent = np.radians([[28.0, -28.0, 28.0, -28.0, 28.0, -28.0]])
     assert bearable_payload(heavy, bent) < 0.0

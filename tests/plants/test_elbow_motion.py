@@ -152,7 +152,7 @@ def open_spans(widths: Array, valve: OnOffValve) -> list[tuple[float, float]]:
 @slow
 @pytest.mark.parametrize("valves", MAKES)
 @pytest.mark.parametrize("hysteresis", kinds())
-def test_the_integrator_is_fine_enough(hysteresis: str, valves: str) -> None:
+def test_integrator_converges_to_a_fine_reference(hysteresis: str, valves: str) -> None:
     """Against 25 and 100 times as many sub-steps; kinks of the hysteresis reduce the order."""
     plant = ElbowOrthosis.paper(hysteresis, valves)  # type: ignore[arg-type]
     commands = commands_for(plant, 400)
@@ -173,7 +173,7 @@ def test_the_integrator_is_fine_enough(hysteresis: str, valves: str) -> None:
 # --- air -----------------------------------------------------------------------------------------
 
 
-def test_shut_valves_keep_the_air_while_the_wearer_moves() -> None:
+def test_closed_valves_keep_the_air_mass_while_the_wearer_moves() -> None:
     plant = ElbowOrthosis.paper(valves="on_off")
     made = simulate_elbow(plant, np.zeros((200, 2)), intent=reach(200), pressures=(2e5, 4e5))
     for name in ("air_a", "air_b"):
@@ -211,7 +211,7 @@ def test_pulses_are_latched_and_counted_once_a_cycle() -> None:
     assert held["switches"][-1] == 1.0
 
 
-def test_short_pulses_do_nothing() -> None:
+def test_pulses_shorter_than_the_opening_time_have_no_effect() -> None:
     plant = ElbowOrthosis.paper(valves="on_off")
     made = simulate_elbow(plant, np.full((50, 2), 0.0049))
     assert made["used"][-1] == 0.0
@@ -253,7 +253,7 @@ def test_regulators_reach_their_set_points_and_count_what_they_fill() -> None:
 # --- wearer, hysteresis, slack -------------------------------------------------------------------
 
 
-def test_an_orthosis_that_bears_itself_is_not_felt() -> None:
+def test_self_supporting_orthosis_leaves_the_intended_motion_unchanged() -> None:
     """Pressures that bear it at every angle: the intended motion is carried out."""
     plant = ElbowOrthosis.paper(
         "none", link__damping=0.0, link__inertia=1e-4, regulator__time_constant=2e-3,
@@ -288,7 +288,7 @@ def test_shapes_that_do_not_fit_are_refused(
         simulate_elbow([ElbowOrthosis.paper()] * plants, commands, **how)  # type: ignore[arg-type]
 
 
-def test_felt_torque_balances_the_wearer() -> None:
+def test_interaction_torque_balances_the_wearer() -> None:
     """At rest the wearer's muscles carry what he feels, beyond the weight of his own arm."""
     plant = ElbowOrthosis.paper()
     made = simulate_elbow(plant, np.tile([1e5, 3e5], (300, 1)), intent=1.0)
@@ -299,7 +299,7 @@ def test_felt_torque_balances_the_wearer() -> None:
     assert made["felt"][-1] == pytest.approx(made["torque"][-1] - weight, abs=1e-6)
 
 
-def test_the_felt_torque_moves_the_forearm() -> None:
+def test_interaction_torque_moves_the_forearm() -> None:
     """Newton's law of the forearm alone, in motion."""
     plant = ElbowOrthosis.paper("none", regulator__slew_rate=1e9)
     intent = reach(300, frequency=0.8)
@@ -318,7 +318,7 @@ def test_the_felt_torque_moves_the_forearm() -> None:
 
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
-def test_friction_takes_work_in_a_cycle_and_nothing_without_hysteresis(hysteresis: str) -> None:
+def test_friction_dissipates_work_in_a_cycle_only_with_hysteresis(hysteresis: str) -> None:
     lost = []
     for kind in ("none", hysteresis):
         plant = ElbowOrthosis.paper(kind)  # type: ignore[arg-type]
@@ -330,7 +330,7 @@ def test_friction_takes_work_in_a_cycle_and_nothing_without_hysteresis(hysteresi
     assert 0.5 < lost[1] < 3.0
 
 
-def test_loops_are_as_published_where_the_wearer_leads() -> None:
+def test_loops_are_as_published_in_motion_led_by_the_wearer() -> None:
     """Force against contraction at 500 kPa, over the whole range: 7.5 % between the branches."""
     plant = ElbowOrthosis.paper(wearer__stiffness=200.0, wearer__damping=10.0, link__gravity=0.0)
     n = 1600
@@ -360,7 +360,9 @@ def test_a_bundle_beyond_its_reach_is_slack_and_never_pushes() -> None:
 
 @pytest.mark.parametrize("counts", [(1, 1), (2, 9), (12, 6)])
 @pytest.mark.parametrize("valves", MAKES)
-def test_any_number_of_muscles_runs(counts: tuple[int, int], valves: str) -> None:
+def test_bundles_of_any_number_of_muscles_can_be_simulated(
+    counts: tuple[int, int], valves: str
+) -> None:
     a, b = counts
     plant = ElbowOrthosis.paper(valves=valves, bundle_a__muscles=a, bundle_b__muscles=b)  # type: ignore[arg-type]
     made = simulate_elbow(plant, commands_for(plant, 60), intent=reach(60), pressures=(2e5, 2e5))

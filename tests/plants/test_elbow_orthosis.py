@@ -44,12 +44,14 @@ def orthosis(a: int = 3, b: int = 7, **changes: float) -> ElbowOrthosis:
         (0.0, FULL, (27.23, 16.87, 7.85)),
     ],
 )
-def test_the_torque_table(pressure_a: float, pressure_b: float, torques: tuple[float, ...]) -> None:
+def test_torque_equals_the_expected_table(
+    pressure_a: float, pressure_b: float, torques: tuple[float, ...]
+) -> None:
     made = orthosis().torque(ANGLES, pressure_a, pressure_b)
     assert made == pytest.approx(torques, abs=0.02)
 
 
-def test_the_stiffness_table() -> None:
+def test_stiffness_equals_the_expected_table() -> None:
     plant = orthosis()
     assert plant.stiffness(ANGLES, FULL, FULL) == pytest.approx((13.39, 12.61, 11.84), abs=6e-3)
     assert plant.stiffness(ANGLES, 0.0, 0.0) == pytest.approx((1.43, 1.35, 1.26), abs=6e-3)
@@ -104,7 +106,7 @@ def test_feasible_set_is_a_parallelogram() -> None:
 
 
 @pytest.mark.parametrize(("share", "area"), [(0.28, 105.0), (0.33, 138.0)])
-def test_the_area_of_the_feasible_set(share: float, area: float) -> None:
+def test_feasible_set_has_the_expected_area(share: float, area: float) -> None:
     """The 137 to 139 N2 m2/rad that were reckoned beforehand belong to C_max = 0.33 L_n."""
     ends = {f"bundle_{b}__largest_contraction": share for b in "ab"}
     torque, stiffness = orthosis(**ends).corners(np.radians([20.0, 60.0, 100.0]))
@@ -178,7 +180,7 @@ def width(kind: str, middle: float, swing: float) -> float:
     return float(np.abs(fall - rise).max()) / (2.0 * hysteresis.largest_lag)
 
 
-def test_the_hysteresis_models_are_alike_in_their_widest_loop_only() -> None:
+def test_hysteresis_models_agree_only_in_their_widest_loop() -> None:
     for kind in ("maxwell_slip", "preisach"):
         assert width(kind, 0.0, 0.033) == pytest.approx(1.0, abs=1e-3)
     plays = [width("maxwell_slip", place, 0.01) for place in (0.0, 0.02)]
@@ -199,7 +201,7 @@ def test_relays_follow_the_travel_in_one_direction() -> None:
     assert 0.5 * (rise + fall)[inside] == pytest.approx(x[inside], abs=2e-4)
 
 
-def test_of_plays_as_relays_the_largest_lag_is_the_same() -> None:
+def test_plays_and_relays_have_the_same_largest_lag() -> None:
     wide = Preisach.resembling(travel_plays(), -0.06, 0.06, 121, start="virgin")
     lag = elbow_hysteresis("maxwell_slip").largest_lag
     assert ElbowHysteresis(wide).largest_lag == pytest.approx(lag, rel=1e-9)
@@ -223,7 +225,7 @@ def test_bad_values_are_refused_with_a_remedy(changes: dict[str, float], words: 
         ElbowOrthosis.paper(**changes)  # type: ignore[arg-type]
 
 
-def test_bad_makes_and_hysteresis_models_are_refused() -> None:
+def test_unknown_valve_types_and_hysteresis_models_are_refused() -> None:
     with pytest.raises(ValueError, match="valves = 'pulsed'"):
         ElbowOrthosis.paper(valves="pulsed")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="hysteresis = 'dahl'"):

@@ -137,7 +137,7 @@ VARIED = {
 @pytest.mark.skipif(not COMPILED, reason="needs the compiler")
 @pytest.mark.parametrize("name", RUNS)
 @pytest.mark.parametrize("kind", kinds())
-def test_machine_code_gives_the_bits_of_plain_python(kind: str, name: str) -> None:
+def test_compiled_code_gives_the_bits_of_plain_python(kind: str, name: str) -> None:
     plant = PLANTS[kind, name]
     compiled, plain = (RUNS[name](plant, 0, compiled=c) for c in (True, False))
     for signal, values in plain.items():
@@ -146,7 +146,7 @@ def test_machine_code_gives_the_bits_of_plain_python(kind: str, name: str) -> No
 
 @pytest.mark.skipif(not COMPILED, reason="needs the compiler")
 @pytest.mark.parametrize("kind", kinds())
-def test_machine_code_gives_the_bits_of_plain_python_for_the_arm(kind: str) -> None:
+def test_compiled_code_gives_the_bits_of_plain_python_for_the_arm(kind: str) -> None:
     plant, commands = RedundantManipulator.paper(kind), drawn(-0.5, 0.5, 20, 6)
     compiled, plain = (
         simulate_manipulator(plant, commands, payload=0.1, compiled=c) for c in (True, False)

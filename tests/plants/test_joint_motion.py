@@ -167,7 +167,7 @@ def test_energy_is_lost_in_free_motion() -> None:
     assert abs(made["angle"][-1]) < 0.02 * DEGREE
 
 
-def test_a_slow_push_and_back_loses_work_to_the_hysteresis() -> None:
+def test_slow_push_and_return_dissipates_work_by_hysteresis() -> None:
     """Viscosity takes work in proportion to the speed, friction the same however slow it is."""
     dry, viscous = {}, {}
     for kind in kinds():
@@ -185,7 +185,7 @@ def test_a_slow_push_and_back_loses_work_to_the_hysteresis() -> None:
     assert dry["preisach"] == pytest.approx(dry["maxwell_slip"], rel=0.05)
 
 
-def test_a_heavier_link_keeps_its_form() -> None:
+def test_heavier_link_keeps_its_shape() -> None:
     light, heavy = (AntagonisticJoint.paper(link__mass=m).link for m in (0.2, 0.4))
     assert heavy.inertia == pytest.approx(2.0 * light.inertia)
     assert AntagonisticJoint.paper().link.inertia == pytest.approx(0.3 * 0.25**2 / 3.0)
@@ -209,7 +209,7 @@ def test_the_stop_holds_the_joint() -> None:
     assert made["angle"][-1] == pytest.approx(rest[0], abs=0.1 * DEGREE)
 
 
-def test_more_payload_is_slower_and_sinks() -> None:
+def test_payload_slows_the_joint_and_lowers_its_angle() -> None:
     plant = AntagonisticJoint.paper("none")
     commands = np.concatenate([np.zeros(2), np.full(150, 15.0 * DEGREE)])
     light, heavy = (simulate_joint(plant, commands, payload=m)["angle"] for m in (0.0, 1.0))
@@ -219,7 +219,7 @@ def test_more_payload_is_slower_and_sinks() -> None:
 
 @pytest.mark.parametrize("make", MAKES)
 @pytest.mark.parametrize("kind", kinds())
-def test_a_joint_at_rest_stays(make: str, kind) -> None:  # type: ignore[no-untyped-def]
+def test_joint_at_rest_stays_at_rest(make: str, kind) -> None:  # type: ignore[no-untyped-def]
     plant = getattr(AntagonisticJoint, make)(kind)
     made = simulate_joint(plant, np.full(40, 12.0 * DEGREE), payload=0.3, disturbance=0.4)
     assert np.ptp(made["angle"]) < 1e-9 and np.abs(made["velocity"]).max() < 1e-7
@@ -227,7 +227,7 @@ def test_a_joint_at_rest_stays(make: str, kind) -> None:  # type: ignore[no-unty
 
 @pytest.mark.parametrize("make", ["paper", "reduced"])
 @pytest.mark.parametrize("kind", kinds())
-def test_slow_commands_come_to_the_quasi_static_angles(make: str, kind) -> None:  # type: ignore[no-untyped-def]
+def test_slow_commands_reach_the_quasi_static_angles(make: str, kind) -> None:  # type: ignore[no-untyped-def]
     plant = getattr(AntagonisticJoint, make)(kind, link__gravity=0.0)
     commands = DEGREE * np.array([0.0, 15.0, -5.0, 10.0, 2.0])
     held = simulate_joint(plant, np.repeat(commands, 80))["angle"][79::80]

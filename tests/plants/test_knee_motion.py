@@ -133,7 +133,7 @@ def test_plant_at_rest_stays_at_rest(mounting: str, dynamics: str) -> None:
     assert np.abs(made["velocity"]).max() < 1e-9
 
 
-def test_friction_and_muscle_take_what_the_spring_gives_up() -> None:
+def test_energy_of_the_spring_equals_work_on_friction_and_muscle() -> None:
     """After a vent, wire and motion lose what the bearings turn to heat."""
     plant = KneeOrthosis.no_load("none", regulator__time_constant=0.002, lever__inertia=0.3)
     made = simulate_knee(plant, np.zeros(200), pressure=3e5)
@@ -148,7 +148,7 @@ def test_friction_and_muscle_take_what_the_spring_gives_up() -> None:
     assert np.abs(energy[0] - energy[1:] - heat).max() < 0.01 * energy[0]
 
 
-def test_the_published_dynamics_lie_between_set_point_and_tension() -> None:
+def test_published_dynamics_relate_setpoint_to_tension() -> None:
     """On the rig, without hysteresis: 79 N/bar and the published phase at 0.5 Hz."""
     plant = KneeOrthosis.rig("none", "measured")
     t = PERIOD * np.arange(1200)
@@ -169,7 +169,7 @@ def tracking_error(plant: KneeOrthosis, command: Callable[[np.ndarray], np.ndarr
     return float(np.sqrt(np.mean(error[1000:] ** 2)) / 3500.0)
 
 
-def test_the_inverse_alone_tracks_as_published() -> None:
+def test_inverse_alone_has_the_published_error() -> None:
     plant = KneeOrthosis.rig()
     model = plant.hysteresis.operator
     inverse = tracking_error(plant, lambda s: model.inverse_simulate(s)[0])  # type: ignore[union-attr]
@@ -195,7 +195,7 @@ def missed_by_equation_1(time: float, *added: str) -> float:
     return float(np.sqrt(np.mean((whole - made["demand"])[made["stance"] > 0] ** 2)))
 
 
-def test_equation_1_is_good_at_the_papers_pace_but_for_the_weight_of_the_shank() -> None:
+def test_error_of_equation_1_at_the_papers_pace_is_mainly_the_shank_weight() -> None:
     """4 N m were asked for; a shank without weight, as the paper has it, would do."""
     assert missed_by_equation_1(PAPER_STRIDE, "weight") < 4.0
     assert missed_by_equation_1(PAPER_STRIDE) == pytest.approx(4.71, abs=0.1)
@@ -222,7 +222,7 @@ def test_equation_1_misses_the_horizontal_force() -> None:
 @pytest.mark.parametrize(
     ("activity", "most"), [("walk", 0.5), ("stairs_up", 0.5), ("stairs_down", 0.65)]
 )
-def test_a_leg_that_swings_does_not_bear_the_body(activity: str, most: float, time: float) -> None:
+def test_swinging_leg_carries_little_body_weight(activity: str, most: float, time: float) -> None:
     """At most half of the body weight when the heel is free; down the synthetic stairs 0.65."""
     plant = KneeOrthosis.on_leg(activity, time, "none")  # type: ignore[arg-type]
     made = stride(plant)
@@ -234,7 +234,7 @@ def test_a_leg_that_swings_does_not_bear_the_body(activity: str, most: float, ti
 
 
 @pytest.mark.parametrize("time", [PAPER_STRIDE, NATURAL_STRIDE])
-def test_the_centre_of_pressure_stays_where_that_of_the_measured_stride_is(time: float) -> None:
+def test_centre_of_pressure_stays_within_that_of_the_natural_stride(time: float) -> None:
     natural = stride(KneeOrthosis.on_leg("walk", NATURAL_STRIDE, "none"))
     made = stride(KneeOrthosis.on_leg("walk", time, "none"))
     loaded = [m["cop"][m["ground_z"] > 50.0] for m in (made, natural)]
@@ -242,7 +242,7 @@ def test_the_centre_of_pressure_stays_where_that_of_the_measured_stride_is(time:
     assert loaded[0].min() >= -0.05
 
 
-def test_slow_walkers_stay_at_the_heel_for_longer() -> None:
+def test_centre_of_pressure_stays_longer_at_the_heel_in_slow_walking() -> None:
     plant = KneeOrthosis.on_leg("walk", PAPER_STRIDE, "none")
     made, bare = (stride(p) for p in (plant, plant.replace({"leg.aim_height": 0.0})))
     early = (made["phase"] > 0.05) & (made["phase"] < 0.3)
@@ -268,7 +268,7 @@ def test_strides_repeat(activity: str) -> None:
         assert np.abs(made[name][200:400] - made[name][400:]).max() < 1e-3 * scale
 
 
-def test_pushed_off_his_path_the_wearer_bears_the_difference() -> None:
+def test_wearer_bears_the_torque_of_a_deviation_from_the_path() -> None:
     """In slow motion the torque of the brace past what he has learnt is held by his stiffness."""
     plant = KneeOrthosis.on_leg("walk", 20.0, "none")
     made = simulate_knee(plant, np.full(400, 2.5e5), pressure=2.5e5)
@@ -286,12 +286,12 @@ def emg_change(time: float) -> float:
     return emg_proxy(made["demand"], 0.2 * made["estimate"], PERIOD, bare).change
 
 
-def test_exact_assistance_helps_at_the_papers_pace_and_hinders_at_the_natural() -> None:
+def test_exact_assistance_reduces_demand_at_the_papers_pace_and_raises_it_at_the_natural() -> None:
     assert emg_change(PAPER_STRIDE) == pytest.approx(-0.208, abs=0.005)
     assert emg_change(NATURAL_STRIDE) > 0.1
 
 
-def test_the_activations_are_those_of_the_proxy() -> None:
+def test_activations_equal_the_emg_proxy() -> None:
     plant = KneeOrthosis.on_leg("stairs_up", PAPER_STRIDE, "none")
     made = stride(plant)
     proxy = emg_proxy(made["demand"], made["torque"], PERIOD, plant.activation)

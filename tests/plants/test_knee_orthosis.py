@@ -31,7 +31,7 @@ def test_the_brace_without_load_has_the_published_range() -> None:
     assert plant.stiffness_for(tension, angle) == pytest.approx(stiffness, rel=1e-9)
 
 
-def test_the_nominal_point() -> None:
+def test_nominal_point_is_as_published() -> None:
     plant = KneeOrthosis.no_load("none")
     angle = float(plant.angle_at(plant.muscle.stiffness_ratio * 2e5))
     assert math.degrees(angle) == pytest.approx(110.0, abs=0.1)
@@ -41,13 +41,13 @@ def test_the_nominal_point() -> None:
     assert float(tension) == pytest.approx(158.0, abs=0.1)
 
 
-def test_more_assistance_takes_more_tension() -> None:
+def test_assistance_increases_with_tension() -> None:
     plant = KneeOrthosis.on_leg("walk")
     angles = np.radians([100.0, 120.0, 140.0])
     assert np.all(plant.tension_for(angles, 8.0) > plant.tension_for(angles, 0.0))
 
 
-def test_the_volume_does_the_muscles_work() -> None:
+def test_volume_satisfies_virtual_work_of_the_muscle() -> None:
     """T = -P dV/dL."""
     muscle, h = KneeOrthosis.rig("none").muscle, 1e-6
     for length in (0.18, 0.22, 0.24):
@@ -67,7 +67,7 @@ def test_both_hysteresis_models_have_the_same_loops() -> None:
     assert (down - up) / FULL_STIFFNESS == pytest.approx(0.15, abs=0.03)
 
 
-def test_preisach_of_a_bent_spring_is_passive() -> None:
+def test_preisach_of_a_nonlinear_spring_is_passive() -> None:
     model = knee_hysteresis("maxwell_slip").operator
     assert model is not None
     bent = dataclasses.replace(model, spring=tuple(p + 0.05 * p * p / 4e5 for p in model.spring))  # type: ignore[union-attr]
@@ -110,7 +110,7 @@ def test_bad_values_are_refused_with_a_remedy(make, message: str) -> None:  # ty
         make()
 
 
-def test_a_file_with_a_wrong_choice_is_named(tmp_path: Path) -> None:
+def test_plant_file_with_a_wrong_choice_is_named(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text("schema: 1\nfamily: knee_orthosis\nmounting: shelf\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"rig\.yaml: mounting = 'shelf'"):

@@ -119,7 +119,7 @@ def test_arm_of_one_joint_is_the_joint() -> None:
     assert np.count_nonzero(np.abs(model.poles() + 23.4) < 1.0) >= 1
 
 
-def test_five_lines_from_a_plant_to_a_regulator() -> None:
+def test_linearised_plant_gives_a_stabilising_regulator() -> None:
     code = (lin.__doc__ or "").split("::\n")[1].split("\n\nA family")[0]
     space: dict[str, Any] = {}
     exec("\n".join(line.strip() for line in code.strip().splitlines()), space)

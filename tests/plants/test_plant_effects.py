@@ -101,7 +101,7 @@ def test_dead_band_leaves_an_error(name: str) -> None:
 
 
 @EVERY
-def test_choked_exhaust_vents_slower(name: str) -> None:
+def test_choked_exhaust_deflates_more_slowly(name: str) -> None:
     down = np.concatenate([np.full(100, 4e5), np.zeros(20)])
     plain, choked = (
         driven(name, c, down)["pressure"] for c in ({}, {"regulator.exhaust_rate": 0.5})
@@ -148,7 +148,7 @@ def test_creep_moves_after_the_pressure_has_settled(name: str) -> None:
 
 
 @EVERY
-def test_first_cycles_lose_force_that_comes_back(name: str) -> None:
+def test_first_cycles_reduce_the_force_reversibly(name: str) -> None:
     lost = {"hysteresis.first_loss": 0.2, "hysteresis.first_travel": 2e5}
     command = np.tile(np.repeat([3e5, 1e5], 60), 6)
     plain, worn = (driven(name, c, command)["moved"] for c in ({}, lost))
@@ -171,7 +171,7 @@ def test_temperature_raises_the_effective_pressure(name: str) -> None:
     [("knee_orthosis", "lever.stick"), ("antagonistic_joint", "link.stick"),
      ("elbow_orthosis", "link.stick"), ("single_muscle", "mass.stick")],
 )  # fmt: skip
-def test_sticking_bearing_holds_against_a_small_push(name: str, stick: str) -> None:
+def test_static_friction_of_the_bearing_resists_a_small_push(name: str, stick: str) -> None:
     plant, run = PLANTS[name]
     command = np.where(np.arange(120) < 80, 2e5, 2.02e5)
     large = 100.0 if name == "single_muscle" else 20.0

@@ -31,7 +31,7 @@ def steps(n: int, largest: float, every: int = 12, seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", kinds())
 @pytest.mark.parametrize("payload", [0.0, 0.1, 0.5])
-def test_at_rest_the_muscles_bear_the_weights(kind, payload: float) -> None:  # type: ignore[no-untyped-def]
+def test_muscles_at_rest_bear_the_weights(kind, payload: float) -> None:  # type: ignore[no-untyped-def]
     plant = RedundantManipulator.paper(kind)
     made = simulate_manipulator(plant, np.tile(POSE, (60, 1)), payload=payload)
     weight = plant.chain.gravity_torque(made["angle"][-1], payload)
@@ -40,7 +40,7 @@ def test_at_rest_the_muscles_bear_the_weights(kind, payload: float) -> None:  # 
     assert np.ptp(made["angle"], axis=0).max() < 1e-9
 
 
-def test_torques_are_those_of_forces_and_levers() -> None:
+def test_torques_follow_from_forces_and_lever_arms() -> None:
     plant = RedundantManipulator.paper()
     made = simulate_manipulator(plant, steps(40, 20.0 * DEGREE))
     rate = plant.lever.rate(made["angle"])
@@ -56,7 +56,7 @@ def test_feedforward_has_gain_one_without_gravity() -> None:
     assert np.allclose(made["angle"][-1], POSE, atol=1e-9)
 
 
-def test_the_shift_bears_the_weights() -> None:
+def test_gravity_shift_bears_the_weights() -> None:
     plant = RedundantManipulator.paper("none")
     for payload in (0.0, 0.05):
         commands = POSE + plant.gravity_shift(POSE, payload)
@@ -84,7 +84,7 @@ def test_the_three_paths_are_within_reach_of_the_hanging_arm() -> None:
     assert strained.pressures_for(planned, torque=weights)[2].any()
 
 
-def test_a_chain_of_one_is_the_single_joint() -> None:
+def test_chain_of_one_joint_equals_the_single_joint() -> None:
     """Another integrator, with the same physics."""
     one = SerialChain(("y",), (0.25,), (0.3,), (0.125,), (0.0015625,), (1e-6,))
     arm = dataclasses.replace(RedundantManipulator.paper("maxwell_slip", one), joint_damping=(0.0,))
@@ -112,7 +112,7 @@ def stored(plant: RedundantManipulator, angles: np.ndarray, pressures: np.ndarra
 
 
 @slow
-def test_energy_is_kept_but_for_friction() -> None:
+def test_energy_is_conserved_except_for_friction() -> None:
     """Let go at held pressures: the energy falls by what viscosity takes, with no other loss."""
     plant = RedundantManipulator.paper("none", link__damping=0.0, muscle__viscosity=0.0)
     still = dataclasses.replace(plant, joint_damping=(0.0,) * 6, substeps=40)
@@ -187,13 +187,13 @@ def test_the_measured_arm_is_limited_by_its_base() -> None:
     assert RedundantManipulator.measured("none", floating).link.limit > limit
 
 
-def test_damping_makes_up_a_ratio_of_a_half() -> None:
+def test_damping_ratio_is_a_half() -> None:
     plant = RedundantManipulator.paper()
     assert plant.joint_damping == pytest.approx((2.19, 1.41, 0.75, 0.2, 0.0, 0.0), abs=0.01)
     assert plant.joint_damping == plant.even_damping()
 
 
-def test_the_column_is_parameters_hysteresis_damping_chain() -> None:
+def test_column_order_is_parameters_hysteresis_damping_chain() -> None:
     plant = RedundantManipulator.paper()
     column = plant.parameter_rows()
     assert tuple(column[M.JOINT_DAMPING : M.JOINT_DAMPING + 6]) == plant.joint_damping

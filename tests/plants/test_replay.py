@@ -59,7 +59,7 @@ def test_effect_that_is_off_changes_no_bit(name: str) -> None:
     assert all(np.array_equal(a[k], b[k]) for k in a)
 
 
-def test_a_shut_valve_keeps_the_pressure() -> None:
+def test_closed_valve_keeps_the_pressure() -> None:
     shown = replay(PLANT, inputs())["pressure"]
     assert len(set(shown[41:51].tolist())) == 1
     assert shown[51] != shown[50]

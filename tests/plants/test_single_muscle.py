@@ -117,7 +117,7 @@ def test_exact_inverse_of_the_hysteresis(kind: str, load: float) -> None:
         state = after
 
 
-def test_hysteresis_only_ever_lags() -> None:
+def test_hysteresis_output_lags_its_input() -> None:
     up, down = np.linspace(0, 6e5, 61), np.linspace(6e5, 0, 61)
     for kind in ("maxwell_slip", "preisach"):
         inverse = SingleMuscle.mas10(kind).hysteresis.inverse(0.0, 6e5)
@@ -173,7 +173,7 @@ def test_neutral_effects_change_no_bit() -> None:
     )
 
 
-def test_a_sparse_plant_file_takes_defaults(tmp_path: Path) -> None:
+def test_incomplete_plant_file_gets_defaults(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text("schema: 1\nfamily: single_muscle\nparameters:\n  mass.load: 1\n")
     plant = SingleMuscle.from_yaml(path)

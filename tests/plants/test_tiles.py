@@ -16,12 +16,12 @@ def plant(kind: str, substeps: int = 4) -> Plant:
     )
 
 
-def test_the_first_of_one_make_is_returned() -> None:
+def test_first_of_plants_with_equal_options_is_returned() -> None:
     several = [plant("preisach"), plant("preisach")]
     assert first_of(several, "hysteresis.kind", "substeps") is several[0]
 
 
-def test_other_makes_and_none_are_refused_by_name() -> None:
+def test_plants_with_differing_options_and_empty_lists_are_refused() -> None:
     with pytest.raises(
         ValueError, match=r"one variant \(hysteresis.kind, substeps\), got .*'preisach', 5"
     ):
@@ -30,7 +30,7 @@ def test_other_makes_and_none_are_refused_by_name() -> None:
         first_of([], "substeps")
 
 
-def test_tiles_hold_sets_lane_by_lane_and_repeat_the_last() -> None:
+def test_tiles_arrange_sets_by_lane_and_repeat_the_last() -> None:
     sets = np.arange(15.0).reshape(5, 3)
     tiles = in_tiles(sets, 5, 4)
     assert tiles.shape == (2, 3, 4)

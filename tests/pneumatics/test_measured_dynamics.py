@@ -29,7 +29,7 @@ def rational(s: complex) -> complex:
     return top / bottom
 
 
-def test_static_gain_is_the_published_one() -> None:
+def test_static_gain_is_as_published() -> None:
     assert gain_at_rest() == pytest.approx(0.7398, abs=1e-4)
     assert rational(0j).real == pytest.approx(gain_at_rest())
 
@@ -51,7 +51,7 @@ def test_phases_equal_the_published_ones() -> None:
         assert np.degrees(np.angle(value)) == pytest.approx(phase, abs=0.1)
 
 
-def test_steps_are_exact() -> None:
+def test_step_response_is_exact() -> None:
     """Steps of two lengths under held setpoints, against a cascade integrated numerically."""
     rows = mode_rows()
     rates, gains = np.array(rows[:REAL_MODES]), rows[REAL_MODES : 2 * REAL_MODES]

@@ -78,7 +78,7 @@ def test_gait_tables_equal_their_script() -> None:
         assert np.allclose(stored, made, atol=1e-8)
 
 
-def test_stairs_pass_near_their_knots() -> None:
+def test_stair_curves_pass_near_their_knots() -> None:
     for activity, drawn in STAIRS.items():
         knee = np.degrees(gait_curves(activity, np.linspace(0, 1, 1001))["knee"])
         assert knee.max() == pytest.approx(max(drawn["knee"]), abs=4.0)
@@ -132,6 +132,6 @@ def test_unknown_activity_is_refused_by_name() -> None:
         gait_table("hop")
 
 
-def test_table_is_a_copy() -> None:
+def test_returned_table_is_a_copy() -> None:
     gait_table("walk")[:] = 0.0
     assert gait_table("walk")[:, KNEE].max() > 1.0

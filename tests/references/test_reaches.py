@@ -80,7 +80,7 @@ def test_reach_has_minimum_jerk() -> None:
     assert np.allclose(bend[1:-1], (v[2:] - v[:-2]) * 20.0, atol=0.05)
 
 
-def test_mixed_motions_draw_each_kind_and_differ_by_key() -> None:
+def test_mixed_motions_draw_each_kind_and_depend_on_the_key() -> None:
     kinds = {int(drawn(seed, MIXED)[KIND, 0]) for seed in range(40)}
     assert kinds == set(range(len(MOTIONS) - 1))
     times = np.arange(0.0, 8.0, 0.1)

@@ -36,14 +36,14 @@ def test_results_are_those_of_one_process(dask: DaskProcesses, tmp_path: Path) -
         assert done[str(k)] == Done(str(k), k * k)
 
 
-def test_a_killed_worker_loses_nothing(dask: DaskProcesses, tmp_path: Path) -> None:
+def test_killed_worker_loses_no_result(dask: DaskProcesses, tmp_path: Path) -> None:
     tasks = [Number(k, "deadly once" if k == 1 else "slow", str(tmp_path)) for k in range(8)]
     done = list(run(square, tasks, on(dask)))
     assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(8)]
     assert tasks[1].begins() == 2
 
 
-def test_value_lost_with_its_worker_is_computed_again(dask: DaskProcesses, tmp_path: Path) -> None:
+def test_value_lost_with_its_worker_is_recomputed(dask: DaskProcesses, tmp_path: Path) -> None:
     tasks = [
         Number(k, "dies with its value" if k % 3 == 1 else "", str(tmp_path)) for k in range(6)
     ]
@@ -131,13 +131,13 @@ def test_missing_workers_are_reported_and_awaited(
         assert sorted(d.value for d in done) == [k * k for k in range(8)]
 
 
-def test_missing_scheduler_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_scheduler_raises_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 1.0)
     with pytest.raises(ValueError, match=r"no Dask scheduler answers at .tcp://127\.0\.0\.1:9."):
         list(run(square, [Number(1)], Cluster(backend="dask", address="tcp://127.0.0.1:9")))
 
 
-def test_lost_scheduler_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lost_scheduler_raises_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 6.0)
     with DaskProcesses(tmp_path, workers=1) as dask:
         tasks = [Number(k, "slow", str(tmp_path)) for k in range(100)]

@@ -43,7 +43,7 @@ def test_results_are_those_of_one_process(tmp_path: Path) -> None:
     assert [task.begins() for task in tasks] == [2] * 7  # an error is no reason to try again
 
 
-def test_a_killed_worker_loses_nothing(tmp_path: Path) -> None:
+def test_killed_worker_loses_no_result(tmp_path: Path) -> None:
     tasks = numbers(tmp_path, 10, n3="deadly once", n7="deadly once")
     done = list(run(square, tasks, TWO))
     assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(10)]
@@ -116,7 +116,7 @@ for done in run(square, tasks, Cluster(jobs=2)):
 
 
 @pytest.mark.parametrize("moment", ["it begins", "the workers start", "tasks are done"])
-def test_a_killed_driver_leaves_no_process_behind(moment: str, tmp_path: Path) -> None:
+def test_killed_driver_leaves_no_process(moment: str, tmp_path: Path) -> None:
     family = new_family()
     driver = start(family, "-c", PROGRAM, str(tmp_path))
     begun = {

@@ -65,7 +65,9 @@ def seen_and_done(name: str, model: Any, steps: int) -> Iterator[tuple[Any, Any,
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_file_and_torch_agree_over_whole_episodes(name: str, short_run: Run) -> None:
+def test_exported_actions_equal_those_of_torch_over_whole_episodes(
+    name: str, short_run: Run
+) -> None:
     model, folder = short_run(name)
     file = OnnxPolicy.load(folder / "policy.onnx")
     policies: list[Any] = []
@@ -85,7 +87,7 @@ def test_file_and_torch_agree_over_whole_episodes(name: str, short_run: Run) -> 
 
 
 @pytest.mark.parametrize("name", REMEMBERS)
-def test_state_is_explicit_and_reset_where_an_episode_begins(name: str, short_run: Run) -> None:
+def test_state_is_explicit_and_reset_at_episode_start(name: str, short_run: Run) -> None:
     file = OnnxPolicy.load(short_run(name)[1] / "policy.onnx")
     given = np.zeros((4, 1), np.float32) if file.corrects else None
     seen = np.random.default_rng(2).uniform(-1, 1, (6, 4, len(file.signals))).astype(np.float32)
@@ -122,7 +124,7 @@ def test_row_with_state_is_independent_of_its_batch(name: str, short_run: Run) -
 
 
 @pytest.mark.parametrize("name", PLAIN)
-def test_policies_without_memory_have_none(name: str, short_run: Run) -> None:
+def test_policies_without_state_return_none(name: str, short_run: Run) -> None:
     file = OnnxPolicy.load(short_run(name)[1] / "policy.onnx")
     assert (file.memory, file.corrects) == (0, "")
 
@@ -130,7 +132,7 @@ def test_policies_without_memory_have_none(name: str, short_run: Run) -> None:
 # --- residuals --------------------------------------------------------------------------------
 
 
-def test_untrained_residual_is_its_controller() -> None:
+def test_untrained_residual_equals_its_controller() -> None:
     from agents.training.building import make_model
 
     config = kind("residual")

@@ -47,7 +47,7 @@ def observations(number: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_file_and_torch_agree(name: str, request: pytest.FixtureRequest) -> None:
+def test_exported_action_equals_that_of_torch(name: str, request: pytest.FixtureRequest) -> None:
     model, folder = request.getfixturevalue(name)
     policy = OnnxPolicy.load(folder / "policy.onnx")
     seen = observations(500)
@@ -185,7 +185,9 @@ def _refused() -> None:
 
 
 @pytest.mark.parametrize("disguise", ["policy.zip", "policy.onnx", "policy.pt", "policy.yaml"])
-def test_a_doctored_zip_runs_nothing(disguise: str, ppo: tuple[Any, Path], tmp_path: Path) -> None:
+def test_malicious_zip_is_not_executed(
+    disguise: str, ppo: tuple[Any, Path], tmp_path: Path
+) -> None:
     marker = tmp_path / "ran"
     bomb = doctored_zip(tmp_path / "bomb.zip", ppo[0], marker)
     path = tmp_path / disguise
@@ -196,7 +198,7 @@ def test_a_doctored_zip_runs_nothing(disguise: str, ppo: tuple[Any, Path], tmp_p
     assert not marker.exists()
 
 
-def test_the_doctored_zip_would_run_code_elsewhere(ppo: tuple[Any, Path], tmp_path: Path) -> None:
+def test_malicious_zip_runs_code_in_stable_baselines(ppo: tuple[Any, Path], tmp_path: Path) -> None:
     """Without this, the test above could pass on a harmless file."""
     marker = tmp_path / "ran"
     bomb = doctored_zip(tmp_path / "bomb.zip", ppo[0], marker)
@@ -213,7 +215,7 @@ def test_zips_and_pickles_are_refused_with_the_reason(
 
 
 @pytest.mark.parametrize("protocol", [0, 2, 5])
-def test_a_doctored_pickle_runs_nothing(protocol: int, tmp_path: Path) -> None:
+def test_malicious_pickle_is_not_executed(protocol: int, tmp_path: Path) -> None:
     marker = tmp_path / "ran"
     (tmp_path / "p.pkl").write_bytes(pickle.dumps(Doctored(marker), protocol=protocol))
     for load in loaders(tmp_path / "p.pkl", tmp_path).values():
@@ -271,7 +273,7 @@ def test_settings_cannot_import_a_module(
     assert not gift.marker.exists()
 
 
-def test_module_would_be_imported_by_gymnasium(gift: Gift) -> None:
+def test_gymnasium_imports_the_module_of_an_id(gift: Gift) -> None:
     """Without this, the test above could pass on a harmless name."""
     gym.make_vec(gift.env, 1, vectorization_mode="vector_entry_point")
     assert gift.marker.exists()

@@ -73,7 +73,7 @@ def test_invalid_preset_is_named(name: str, text: str, message: str, presets: Pa
         catalogue.offered()
 
 
-def test_suffix_of_an_unlisted_environment() -> None:
+def test_unlisted_environment_gets_its_snake_case_name_as_suffix() -> None:
     assert catalogue._suffix("AnkleBrace2-v0") == "_ankle_brace2"
     assert catalogue._suffix("MusclePositioning-v0") == ""
 

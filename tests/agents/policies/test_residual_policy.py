@@ -200,7 +200,7 @@ def test_controllers_states_survive_a_checkpoint(residual: ResidualVecEnv, tmp_p
         found = RecordedAnswers.from_dict(entry, len(signals), (width or (1,))[0])
         assert (np.abs(found.answers) < 1.0).mean() >= 1.0 - recording.MOST_AT_LIMIT
         rests = not np.ptp(found.observations[:, read], axis=0).any()
-        # an arm's path begins after the probe, and a feed-forward waits for it
+        # an arm's path begins after the probe, and a feedforward waits for it
         assert rests or np.ptp(found.answers, axis=0).max() > 1e-2
 
 

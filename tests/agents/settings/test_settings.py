@@ -117,7 +117,7 @@ def test_search_budget_is_not_inherited(tmp_path: Path, monkeypatch: pytest.Monk
     assert configs.read(tmp_path / "A-v0.ppo.yaml").search.trials == 40
 
 
-def test_decisive_settings() -> None:
+def test_decisive_settings_are_those_that_affect_the_policy() -> None:
     config = configs.preset(ID, "ppo")
     idle = configs.changed(config, ["search.trials=40", "checkpoint_steps=123"])
     assert idle.decisive() == config.decisive()
@@ -149,7 +149,7 @@ def test_rows_are_divided_among_all_combinations() -> None:
     )
 
 
-def test_settings_survive_their_plain_form() -> None:
+def test_settings_round_trip_through_plain_values() -> None:
     for names in configs.presets():
         config = configs.preset(*names)
         assert configs.from_mapping(config.as_dict()) == config

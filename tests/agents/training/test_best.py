@@ -79,7 +79,9 @@ def test_command_prints_the_evaluations(
     assert ["exported" in line for line in lines] == [False, True, False]
 
 
-def test_normaliser_is_that_of_the_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exported_normaliser_belongs_to_the_best_policy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = run_in(tmp_path / "whole", normalize=NORMALIZED)
     _, model, _ = judged(run, {0: 5.0, 512: 1.0, 1024: 3.0}, monkeypatch)
     half = Run(run.config, 3, tmp_path / "half")
@@ -107,7 +109,7 @@ def test_policy_without_a_value_is_not_preferred(
 
 
 @pytest.mark.parametrize("normalize", [{}, {"normalize": NORMALIZED}], ids=["plain", "normalized"])
-def test_resumed_run_keeps_its_best(
+def test_resumed_run_keeps_its_best_policy(
     normalize: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     values = {0: 5.0, 512: 1.0, 1024: 3.0}

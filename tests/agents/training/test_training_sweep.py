@@ -129,9 +129,7 @@ def test_killed_dask_worker_and_driver_lose_no_training(
     assert driver.policies() == whole
 
 
-def test_training_that_nobody_waits_for_stops(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_training_of_an_ended_sweep_stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     answers = iter([True, True, False])
     monkeypatch.setattr(callbacks, "is_needed", lambda: next(answers))
     (training,) = sweep.trainings([CONFIG], (3,), tmp_path, "ppo")
@@ -192,7 +190,9 @@ def test_record_is_written_before_the_policy(
     assert written == ["policy.json", "policy.onnx"]
 
 
-def test_other_code_is_another_training(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_worker_with_other_code_refuses_the_training(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A worker that computes another key than the driver's refuses the task."""
     training = Run(CONFIG, 3, tmp_path)
     key = training.key
@@ -202,7 +202,7 @@ def test_other_code_is_another_training(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize("package", ["gymnasium", "scipy", "torch", "stable_baselines3"])
-def test_other_versions_are_another_training(
+def test_worker_with_other_versions_refuses_the_training(
     package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     training = Run(CONFIG, 3, tmp_path)

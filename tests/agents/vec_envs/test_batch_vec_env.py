@@ -30,7 +30,7 @@ def test_single_environment_passes_the_checker_without_a_warning() -> None:
         check_env(gym.make(ID, normalize=True, reference="mixed", load=None).unwrapped)
 
 
-def test_rows_are_those_of_the_batched_environment_and_of_single_ones() -> None:
+def test_rows_equal_batched_and_single_environments() -> None:
     env = make_batch_vec_env(ID, N, **SHORT)
     batch = gym.make_vec(ID, N, vectorization_mode="vector_entry_point", **SHORT)
     singles = [gym.make(ID, **SHORT) for _ in range(N)]
@@ -83,7 +83,7 @@ def test_only_ended_rows_have_an_info_of_their_own() -> None:
             )
 
 
-def test_the_shared_info_cannot_be_written_to() -> None:
+def test_shared_info_is_read_only() -> None:
     for write in (
         lambda: NO_INFO.update(a=1),
         lambda: NO_INFO.setdefault("a", 1),
@@ -97,7 +97,7 @@ def test_the_shared_info_cannot_be_written_to() -> None:
     assert copy.deepcopy(NO_INFO) == {}
 
 
-def test_infos_are_reported_by_row_when_asked_for() -> None:
+def test_requested_infos_are_reported_by_row() -> None:
     env = make_batch_vec_env(ID, N, info=True, **SHORT)
     env.seed(SEED)
     env.reset()

@@ -63,7 +63,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_controller_in_a_folder_outside_joins_the_catalogue_the_battery_and_the_benchmark(folder):
+def test_third_party_controller_enters_catalogue_checks_and_benchmark(folder):
     assert load(folder) == ["toy_integrator"]
     env = make_env(load=2.55, reference="staircase", episode_seconds=3.0)
     toy = built("toy_integrator", env)

@@ -78,7 +78,7 @@ def test_knobs_scale_the_times_of_the_simc_rule():
     assert keen == plain._replace(derivative_time=0.1)
 
 
-def test_knobs_of_the_muscle_act_on_their_numbers():
+def test_knobs_of_the_muscle_scale_their_parameters():
     env = make_env("PAM/MusclePositioning-v0")
     pid, inverse = built("pid", env), built("inverse", env)
     assert built("pid", env, reach=2.0).view.reach == pytest.approx(2.0 * pid.view.reach)
@@ -94,7 +94,7 @@ def test_knobs_of_the_muscle_act_on_their_numbers():
     assert both.gains == built("pid", env, closed_loop_time=2.0).gains
 
 
-def test_knobs_of_the_knee_act_on_their_numbers():
+def test_knobs_of_the_knee_scale_their_parameters():
     env = make_env("PAM/KneeStiffness-v0")
     plain = knee_design.design(env.plant, "tension").figures
     fast = knee_design.design(env.plant, "tension", knobs={"bandwidth": 2.0}).figures
@@ -108,7 +108,7 @@ def test_knobs_of_the_knee_act_on_their_numbers():
     assert np.abs(loops[1].controller.c).max() != np.abs(loops[0].controller.c).max()
 
 
-def test_knobs_of_the_joint_act_on_their_numbers():
+def test_knobs_of_the_joint_scale_their_parameters():
     env = make_env("PAM/AntagonisticJoint-v0")
     leads = [built("joint_pid_ahead", env, lead=k).parts.preview[0] for k in (0.5, 1.0)]
     times = np.arange(len(leads[0]))
@@ -125,7 +125,7 @@ def test_knobs_of_the_joint_act_on_their_numbers():
     assert shares[0] > shares[1]
 
 
-def test_knobs_of_the_elbow_act_on_their_numbers():
+def test_knobs_of_the_elbow_scale_their_parameters():
     env = make_env("PAM/ElbowOrthosis-v0")
     plain = built("elbow_pid", env)
     assert built("elbow_pid", env, start=2.0).middle == 2.0 * plain.middle
@@ -213,7 +213,7 @@ def test_tuned_names_differ_by_environment():
         ({"more": 1}, "unexpected keyword argument 'more'; search again"),
     ],
 )
-def test_a_file_that_is_not_as_a_search_writes_it_is_refused(tmp_path, change, message):
+def test_invalid_file_of_tuned_controllers_is_refused(tmp_path, change, message):
     file = written(tmp_path, {"pid_tuned": dataclasses.asdict(FOUND) | change})
     with pytest.raises(ValueError, match=message):
         tuned.entries(PUBLISHED, tuned.read(file))

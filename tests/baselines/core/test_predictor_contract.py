@@ -39,7 +39,7 @@ def observed(env: str, variant: tuple[tuple[str, Any], ...], steps: int = 16) ->
 
 
 @pytest.mark.parametrize(("name", "env", "variant"), CASES)
-def test_controller_keeps_the_contract(name, env, variant):
+def test_controller_satisfies_the_predictor_contract(name, env, variant):
     made, observations = observed(env, tuple(variant.items()))
     if variant.get("load", 0.0) is None:
         assert len(np.unique(made.signals.decode(observations[0], "load").round(3))) > 1
@@ -59,7 +59,7 @@ def test_extreme_observations_give_actions_in_the_space(name, env):
 
 
 @pytest.mark.parametrize(("name", "env"), PAIRS)
-def test_entry_is_complete_and_correct_about_the_preview(name, env):
+def test_entry_is_complete_and_its_preview_flag_correct(name, env):
     entry = PUBLISHED[name]
     assert entry.summary and entry.kind == "classical"
     assert entry.knowledge in ("nothing", "tables", "nominal model", "true model")

@@ -97,21 +97,21 @@ def stable(name: str, gain: float = 1.0, payload: float = 0.0) -> bool:
 
 @pytest.mark.parametrize("payload", [0.0, 0.1])
 @pytest.mark.parametrize("kind", ["mu", "hinf"])
-def test_disturbance_loops_hold_on_the_arm_over_the_whole_sector(kind, payload):
+def test_disturbance_loops_are_stable_on_the_arm_over_the_whole_sector(kind, payload):
     for gain in SECTOR:
         assert stable(kind, gain, payload)
         assert peaks(kind, gain, payload).max() < 1.75
     assert margin(kind, 1.0, payload) > 75.0
 
 
-def test_their_sensitivity_is_above_that_of_the_design_at_the_base():
+def test_sensitivity_at_the_base_exceeds_that_of_the_design():
     found = peaks("mu")
     assert found.max() == pytest.approx(1.24, abs=0.03)
     assert np.argmax(found) in (0, 1)
     assert np.all(found[2:] < 1.12)
 
 
-def test_pid_is_fast_at_the_price_of_its_margin():
+def test_pid_is_fast_with_a_small_phase_margin():
     assert stable("pid") and stable("pid_smooth")
     assert margin("pid") == pytest.approx(18.0, abs=2.0)
     assert margin("pid_smooth") == pytest.approx(39.0, abs=2.0)
@@ -119,11 +119,11 @@ def test_pid_is_fast_at_the_price_of_its_margin():
     assert 1.7 < peaks("pid_smooth").max() < 2.5 < peaks("pid").max()
 
 
-def test_rule_for_one_stage_would_not_hold_the_arm():
+def test_rule_for_one_stage_is_unstable_on_the_arm():
     assert not stable("pid_fast")
 
 
-def test_payload_takes_what_margin_single_loops_have():
+def test_payload_reduces_the_margin_of_single_loops():
     for name in ("pi", "pid", "pid_smooth"):
         assert margin(name, payload=0.1) < 0.6 * margin(name)
         assert peaks(name, payload=0.1).max() > 3.5
@@ -149,7 +149,7 @@ def test_neglected_dynamics_cover_hold_and_computing():
     assert np.all(late < np.abs(RobustDesign().neglected(1j * FREQUENCIES)))
 
 
-def test_double_pole_is_not_the_base_joint_as_it_is():
+def test_double_pole_only_approximates_the_base_joint():
     """The base swings: beyond what the design allows for, which is why it is measured here."""
     hold = np.exp(-0.5j * W * PERIOD)
     nominal = [double_lag(pole)(1j * W) * hold for pole in joint_poles(PLANT)]

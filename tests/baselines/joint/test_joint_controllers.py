@@ -52,7 +52,7 @@ def _observations(rows=3, steps=40):
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if n != "joint_random"])
-def test_two_joints_are_two_single_ones(name):
+def test_controller_of_two_joints_equals_two_single_ones(name):
     pair, actions = _two(name)
     one, seen = controller(name, RIG), _observations(rows=2)
     states, state = [None, None], None
@@ -93,7 +93,7 @@ def test_co_contraction_keeps_its_observed_value():
 
 
 @pytest.mark.parametrize("name", ["joint_pi", "joint_pid", "joint_mfc_mu", "joint_mfc_hinf"])
-def test_joint_held_off_limits_comes_back_without_windup(name):
+def test_joint_returns_from_a_limit_without_windup(name):
     reference = np.concatenate([np.full(300, 1.3 * RANGE), np.full(200, 5.0 * DEGREE)])
     found = run(controller(name, RIG), reference, RIG)
     at_limit = found.set_point[299]
@@ -114,7 +114,7 @@ def test_start_at_rest_elsewhere_has_no_bump(name):
         assert float(action[0]) == pytest.approx(command, abs=1e-3 * DEGREE)
 
 
-def test_joint_with_the_models_hysteresis_is_the_model():
+def test_joint_with_the_models_hysteresis_follows_the_model():
     found = run(controller("joint_mfc_mu", ReducedRig(0.0)), np.full(100, 0.1), ReducedRig(0.0))
     np.testing.assert_allclose(found.angle[9::10], found.model, atol=1e-6)
 
@@ -136,7 +136,7 @@ def test_gravity_feedforward_is_the_shift_of_the_plant():
     assert np.abs(found).max() > 5e-3
 
 
-def test_phase_of_a_double_lag_is_a_quarter_turn_at_its_pole():
+def test_phase_of_a_double_lag_is_90_degrees_at_its_pole():
     time = 0.01 * np.arange(1, 400)
     angle = 1.0 - np.exp(-6.0 * time) * (1.0 + 6.0 * time)
     found = phase(np.diff(np.append(0.0, angle)), 0.01)

@@ -58,7 +58,7 @@ def test_extrapolation_is_bounded():
 
 
 @pytest.mark.parametrize("pole", [5.5, POLE])
-def test_loop_of_the_pi_is_its_delay_up_to_the_third_order(pole):
+def test_loop_of_the_pi_equals_a_delay_up_to_third_order(pole):
     loop = double_lag(pole) * pi_system(pole_cancelling(pole=pole))
     delay = double_pole_delays([pole])[0]
 
@@ -98,7 +98,7 @@ def _error(made) -> float:
     return float(np.sqrt(np.mean(np.square(errors[200:]))))
 
 
-def test_sine_is_followed_without_the_delay():
+def test_preview_removes_the_delay_of_a_sine():
     late = _error(make_model_following(SPEC))
     assert late == pytest.approx(np.sqrt(0.5) * np.pi * (2.0 / POLE + 0.5 * PERIOD), rel=0.02)
     assert _error(make_model_following(SPEC, ahead=True)) < 0.02 * late

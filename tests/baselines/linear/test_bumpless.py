@@ -55,7 +55,7 @@ def switched(loop: Bumpless, offset: float) -> tuple[float, float]:
     return np.abs(outputs[200:]).max(), abs(commands[200] - commands[199])
 
 
-def test_switch_with_a_mismatch_of_10_newton():
+def test_transient_of_a_switch_with_a_mismatch_of_10_newton():
     with_error, with_jump = switched(compensated(), 10.0)
     plain_error, plain_jump = switched(compensated().without(), 10.0)
     assert with_error < 15.0
@@ -68,7 +68,7 @@ def test_switch_without_mismatch_has_no_transient():
     assert switched(compensated().without(), 0.0) == (0.0, 0.0)
 
 
-def test_in_charge_and_unlimited_it_is_the_plain_controller():
+def test_active_unlimited_compensator_equals_the_plain_controller():
     loop = compensated(-1e9, 1e9, NONE)
     (ours, _, state), (plain, _, _) = (
         simulated(one, lambda k: 20.0 * np.sin(0.03 * k), 300) for one in (loop, loop.without())
@@ -77,7 +77,7 @@ def test_in_charge_and_unlimited_it_is_the_plain_controller():
     np.testing.assert_array_equal(state.model, np.zeros(7))
 
 
-def test_idle_controller_sees_the_loop_it_would_have_closed():
+def test_off_line_controller_sees_its_fictitious_loop():
     """On its own model the fictitious loop is the real one, whatever another controller does."""
     loop, rig = compensated(gains=NONE), discrete(PLANT, PERIOD, "zoh")
     idle, real = loop.initial_state(), loop.initial_state()
@@ -131,7 +131,7 @@ def test_direct_gain_acts_only_as_a_factor_of_the_state_gain():
         ({"low": 300.0}, "low is 300.0"),
     ],
 )
-def test_bad_parts_are_refused(change, message):
+def test_inconsistent_parts_are_refused(change, message):
     with pytest.raises(ValueError, match=message):
         replace(compensated(), **change)
 
@@ -147,14 +147,14 @@ def test_printed_gains_satisfy_the_inequality(decay):
     assert certificate(PLANT, GAINS, decay) > SMALLEST
 
 
-def test_no_gains_satisfy_it_beyond_the_slowest_pole():
+def test_no_gains_satisfy_the_inequality_beyond_the_slowest_pole():
     pytest.importorskip("cvxpy")
     assert certificate(PLANT, GAINS, 4.06) < SMALLEST
     with pytest.raises(ValueError, match=r"below 4\.055"):
         design_bumpless(printed_plant(), 4.06)
 
 
-def test_destabilising_gains_do_not_satisfy_it():
+def test_destabilising_gains_violate_the_inequality():
     pytest.importorskip("cvxpy")
     plant = printed_plant()
     gains = BumplessGains(5.0 * plant.C[0] / plant.dcgain())
@@ -172,7 +172,7 @@ def test_design_satisfies_its_own_inequality(decay):
     assert np.max(poles.real) < -decay
 
 
-def test_designed_gains_act_as_the_printed_ones():
+def test_designed_gains_act_like_the_printed_ones():
     pytest.importorskip("cvxpy")
     plant = printed_plant()
     ours = make(plant, printed_controller(), PERIOD, -200.0, 250.0)

@@ -38,7 +38,7 @@ PLANT = printed_plant()
 W = np.geomspace(0.1, 60.0, 50)
 
 
-def test_system_is_its_transfer_function():
+def test_system_has_its_transfer_function():
     top, low = [3.0, 5.0], [2.0, 7.0, 11.0, 1.0]
     system = from_polynomials(top, low)
     s = 1j * W
@@ -47,7 +47,7 @@ def test_system_is_its_transfer_function():
     assert system.dcgain() == pytest.approx(5.0)
 
 
-def test_system_from_roots_and_in_series():
+def test_system_from_roots_and_in_series_has_its_response():
     first = from_roots([-3.0], [-1.0, -2.0 + 1j, -2.0 - 1j], 0.5)
     second = from_polynomials([1.0, 2.0], [1.0, 9.0])
     assert first.dcgain() == pytest.approx(0.5)
@@ -97,7 +97,7 @@ def test_closed_loop_is_stable_with_the_poles_of_filter_and_regulator(bandwidth,
         assert np.min(np.abs(poles - expected)) < 1e-2 * abs(expected)
 
 
-def test_figures_of_a_known_loop():
+def test_figures_of_a_known_loop_are_exact():
     figures = loop_figures(lambda w: 10.0 / (1j * w * (1.0 + 0.05j * w) ** 2))
     assert figures.gain_margin == pytest.approx(4.0, rel=1e-3)  # 2 / tau over 10
     crossing = figures.crossover
@@ -139,7 +139,7 @@ def test_rest_state_is_an_equilibrium():
     np.testing.assert_allclose(held.advance(200.0, state), state, rtol=1e-12, atol=1e-12)
 
 
-def test_sampling_and_delay_cost_phase_as_delays_do():
+def test_sampling_and_delay_reduce_the_phase_margin():
     design = design_ltr(PLANT, 26.2, 1e-8)
     smooth, sampled = design.figures, design.sampled_figures(0.01)
     late = design.sampled_figures(0.01, delay=0.01)
@@ -155,7 +155,7 @@ def test_sampling_and_delay_cost_phase_as_delays_do():
     )
 
 
-def test_delay_margin_is_where_the_sampled_loop_becomes_unstable():
+def test_sampled_loop_becomes_unstable_at_the_delay_margin():
     controller = discrete(printed_controller(), 0.01)
     plant = discrete(PLANT, 0.01, "zoh")
     margin = sampled_figures(PLANT, controller).delay_margin
@@ -206,7 +206,7 @@ def test_plants_that_cannot_be_recovered_are_refused(plant, bandwidth, weight, m
         design_ltr(plant, bandwidth, weight)
 
 
-def test_bad_systems_are_refused():
+def test_invalid_systems_are_refused():
     with pytest.raises(ValueError):
         state_space(np.eye(3), np.ones(2), np.ones(2))
     with pytest.raises(ValueError, match=r"(?i)proper"):
@@ -267,7 +267,7 @@ def test_discrete_system_agrees_with_python_control():
         assert output == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-def test_lanes_are_single_systems():
+def test_lanes_equal_single_systems():
     poles = (2.0, 5.0, 23.0)
     singles = [discrete(from_roots([], [-pole, -2 * pole], 1.0), 0.01) for pole in poles]
     lanes, u = DiscreteSystem.stacked(singles), np.array([[1.0, -2.0, 0.5]] * 2)

@@ -75,7 +75,7 @@ def test_gains_are_reproducible_and_fall_with_the_dead_time():
 
 @pytest.mark.parametrize("load", [0.0, 2.55, 4.55])
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
-def test_closes_the_loop_without_oscillation(hysteresis, load):
+def test_closed_loop_does_not_oscillate(hysteresis, load):
     plant = SingleMuscle.mas10(hysteresis).replace(QUIET)
     reference = np.repeat([3e-3, 8e-3, 12e-3, 6e-3], 250)
     env = make_env(plant=plant, load=load, reference=reference, episode_seconds=10.0)
@@ -111,7 +111,7 @@ def test_loop_of_one_stage_has_margins_with_its_dead_time(smooth, margin, peak):
     assert late.peak_sensitivity == pytest.approx(peak, abs=0.01)
 
 
-def test_rule_without_the_filter_has_the_published_peak():
+def test_simc_rule_without_the_filter_has_the_published_peak():
     pace = 2.0 * DELAY_PERIODS * PERIOD  # the loop is exp(-theta s) / (2 theta s)
     found = loop_figures(lambda w: np.exp(-0.5j * w * pace) / (1j * w * pace))
     assert found.peak_sensitivity == pytest.approx(1.59, abs=0.005)

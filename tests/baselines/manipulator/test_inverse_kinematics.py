@@ -33,7 +33,7 @@ def set_points(action: np.ndarray) -> np.ndarray:
     return np.array([ACTIONS[k].decode(action) for k in range(6)])
 
 
-def test_set_points_are_those_of_the_plan() -> None:
+def test_setpoints_are_those_of_the_plan() -> None:
     line = PATH.angles()
     poses = ARM.pose(line)
     planned = resolve(ARM, poses, start=line[0])
@@ -69,7 +69,7 @@ def test_rows_of_a_batch_are_independent() -> None:
             np.testing.assert_array_equal(action, actions[i])
 
 
-def test_a_pose_out_of_reach_leaves_the_set_points_and_is_counted() -> None:
+def test_pose_out_of_reach_keeps_the_setpoints_and_is_counted() -> None:
     line = PATH.angles()
     good, far = ARM.pose(line[0]), np.array([0.0, 0.0, 1.7, 0.0, 0.0, 1.0])
     follower = make_inverse_kinematics(SPEC)
@@ -82,7 +82,7 @@ def test_a_pose_out_of_reach_leaves_the_set_points_and_is_counted() -> None:
     assert state.missed[0] == 1
 
 
-def test_both_plans_of_a_path() -> None:
+def test_weighted_plan_keeps_joints_within_their_limits() -> None:
     line = PATH.angles()
     both = compare(ARM, ARM.pose(line), start=line[0])
     assert both.unweighted.peak > LIMIT > both.weighted.peak

@@ -13,7 +13,9 @@ from tests.baselines.conftest import QUIET, SECONDS, built, make_env, quiet, rol
 @pytest.mark.parametrize("load", [0.0, 4.55])
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach", "none"])
 @pytest.mark.parametrize("name", ["inverse", "inverse_no_preview", "inverse_pid"])
-def test_staircase_with_inner_loops_is_held_to_10_um(name, hysteresis, load, staircase, settled):
+def test_staircase_with_minor_loops_is_tracked_within_10_um(
+    name, hysteresis, load, staircase, settled
+):
     env = make_env(plant=quiet(hysteresis), load=load, reference=staircase, episode_seconds=SECONDS)
     errors = settled(rollout(env, built(name, env)))
     # an integral creeps to its place in the inner loop that an episode begins in
@@ -22,14 +24,14 @@ def test_staircase_with_inner_loops_is_held_to_10_um(name, hysteresis, load, sta
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
 @pytest.mark.parametrize("name", ["linear", "one_cubic"])
-def test_one_branch_misses_by_the_loop(name, hysteresis, staircase, settled):
+def test_single_branch_errs_by_the_loop_width(name, hysteresis, staircase, settled):
     env = make_env(plant=quiet(hysteresis), load=2.55, reference=staircase, episode_seconds=SECONDS)
     errors = settled(rollout(env, built(name, env)))
     assert np.sqrt(np.mean(errors**2)) > 3e-4
 
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
-def test_slow_ramp_is_followed_within_10_um(hysteresis):
+def test_slow_ramp_is_tracked_within_10_um(hysteresis):
     ramp = np.interp(np.arange(1200), [0, 500, 800, 1200], [2e-3, 12e-3, 6e-3, 9e-3])
     plant = SingleMuscle.mas10(hysteresis).replace(QUIET)  # the regulator's own dead time and lag
     env = make_env(plant=plant, load=2.55, reference=ramp, episode_seconds=12.0)
@@ -48,13 +50,13 @@ def test_preview_removes_the_delay():
     assert rms[0] < 1e-5 < 1e-4 < rms[1]
 
 
-def test_later_aims_are_due_after_longer_travel():
+def test_later_targets_are_due_after_longer_travel():
     aims, due = aims_of(0.04 * np.arange(6), 0.09)
     np.testing.assert_allclose(aims.sum(axis=1), 1.0)
     assert due[0] == 0.0 and np.all(np.diff(due) > 0.0) and len(due) == 4
 
 
-def test_pid_on_top_rests_while_the_model_is_right_and_works_when_it_is_not(staircase, settled):
+def test_pid_acts_only_on_the_model_error(staircase, settled):
     plant = quiet("maxwell_slip", regulator__dead_time=0.045, regulator__time_constant=0.05)
     other = plant.replace(
         {"muscle.area": 0.96 * plant.muscle.area, "hysteresis.width_per_load": 0.0}

@@ -18,7 +18,7 @@ def plant(request):
 PATH = np.concatenate([np.linspace(0, 5.5e5, 9), np.linspace(5e5, 1e5, 7), [3e5, 2e5, 4e5, 3.5e5]])
 
 
-def test_hysteresis_is_the_plants_own(plant):
+def test_nominal_hysteresis_equals_that_of_the_plant(plant):
     muscle, own = Nominal(plant).at(2.55), plant.hysteresis.inverse(2.55, 6e5)
     state, theirs = muscle.hysteresis.initial(1), own.initial_state((1,))
     for pressure in PATH:
@@ -31,7 +31,7 @@ def test_hysteresis_is_the_plants_own(plant):
         )
 
 
-def test_inverse_undoes_the_hysteresis_anywhere_in_a_history(plant):
+def test_inverse_cancels_the_hysteresis_at_any_history(plant):
     muscle = Nominal(plant).at(4.55)
     state = muscle.hysteresis.initial(1)
     for pressure in PATH:
@@ -41,7 +41,7 @@ def test_inverse_undoes_the_hysteresis_anywhere_in_a_history(plant):
             assert muscle.advance(found, state)[0] == pytest.approx(target, abs=1e-3)
 
 
-def test_static_curve_is_the_plants_own(plant):
+def test_nominal_static_curve_equals_that_of_the_plant(plant):
     muscle, drive = Nominal(plant).at(4.55), np.linspace(1e3, 5.9e5, 77)
     np.testing.assert_allclose(
         muscle.contraction_at(drive), plant.contraction_at(drive, 4.55), atol=1e-7
@@ -64,7 +64,7 @@ def test_first_measurement_explains_the_history(plant):
         )
 
 
-def test_regulator_is_the_plants_own(plant):
+def test_nominal_regulator_equals_that_of_the_plant(plant):
     nominal, law = Nominal(plant), plant.regulator
     pressure = np.array([1e5, 1e5, 4e5, 2e5, 5e5])
     target = np.array([1.05e5, 5e5, 0.0, 2e5, 4.65e5])

@@ -30,7 +30,7 @@ def test_equation_11_as_printed_errs_by_8_mm_and_its_refit_by_less_than_1():
     assert _held("plc_refitted", 4.55, levels).max() < 1e-3
 
 
-def test_the_other_inflation_equations_as_printed_are_usable():
+def test_other_inflation_equations_as_printed_are_usable():
     assert _held("plc_as_printed", 0.0, tuple(range(2, 14, 2))).max() < 1.5e-3
 
 
@@ -42,7 +42,7 @@ def test_the_other_inflation_equations_as_printed_are_usable():
         ("table", pchip_inverse()),
     ],
 )
-def test_looked_up_set_points_are_the_curves(name, curves):
+def test_setpoints_follow_the_tabulated_curves(name, curves):
     env = make_env(normalize=False, load=4.55)
     controller, targets = built(name, env), np.linspace(0.5e-3, 14e-3, 101)
     observation, _ = env.reset(seed=1)
@@ -74,18 +74,18 @@ def _taken(reference, contraction=0.0):
     return np.array(taken)
 
 
-def test_start_goes_towards_the_reference():
+def test_first_branch_points_towards_the_reference():
     assert _taken([5e-3], contraction=2e-3)[0]
     assert not _taken([5e-3], contraction=8e-3)[0]
 
 
-def test_steps_choose_at_once_and_keep_while_held():
+def test_step_selects_its_branch_at_once_and_keeps_it_while_held():
     steps = np.repeat([2e-3, 8e-3, 5e-3, 6e-3], 50)
     expected = np.repeat([True, True, False, True], 50)
     np.testing.assert_array_equal(_taken(steps), expected)
 
 
-def test_ramp_turns_after_the_dead_band_however_slow():
+def test_slow_ramp_changes_branch_after_the_dead_band():
     ramp = 5e-3 - 1e-7 * np.arange(2000)  # a thousandth of the dead band a period and below
     taken = _taken(ramp)
     assert np.flatnonzero(~taken)[0] == np.flatnonzero(ramp < ramp[0] - DEAD_BAND)[0]
@@ -103,7 +103,7 @@ def test_reversal_is_measured_from_the_extremum():
     np.testing.assert_array_equal(_taken(creep), [True, True, False])
 
 
-def test_rows_are_independent_and_the_old_branch_is_unchanged():
+def test_rows_are_independent_and_the_argument_is_unchanged():
     branch = first_branch(np.array([5e-3, 5e-3]), np.zeros(2))
     after = next_branch(branch, np.array([4e-3, 6e-3]))
     np.testing.assert_array_equal(after.inflating, [False, True])

@@ -31,20 +31,20 @@ def test_reduced_loops_follow_from_the_synthesised_ones(kind):
 
 
 @pytest.mark.parametrize("stage", ["full", "reduced"])
-def test_mu_loop_is_robust_and_the_h_infinity_loop_is_not_quite(stage):
+def test_mu_loop_is_robust_and_h_infinity_loop_narrowly_fails(stage):
     value = {kind: DESIGN.structured_value(_loop(kind, stage)).max() for kind in ("mu", "hinf")}
     assert value["mu"] < 1.0 < value["hinf"] < 1.1
     assert frozen()["mu"][f"mu_{stage}"] == pytest.approx(value["mu"], rel=1e-6)
 
 
-def test_bound_of_slicot_is_the_exact_value():
+def test_bound_of_slicot_equals_the_exact_value():
     for kind in ("mu", "hinf"):
         exact = DESIGN.structured_value(_loop(kind)).max()
         assert frozen()[kind]["mu_bound_ab13md"] == pytest.approx(exact, rel=1e-6)
 
 
 @pytest.mark.parametrize(("frequency", "size"), [(0.1, 0.013), (1.0, 0.126), (4.0, 0.443)])
-def test_sensitivity(frequency, size):
+def test_sensitivity_has_the_documented_values(frequency, size):
     found = np.interp(frequency, FREQUENCIES, sensitivity(_loop("mu")))
     assert found == pytest.approx(size, rel=0.02)
     assert sensitivity(_loop("mu")).max() < 1.07
@@ -56,7 +56,7 @@ def test_performance_holds_for_every_gain_of_the_sector():
         assert np.max(performance * sensitivity(gain * _loop("mu"))) < 1.0
 
 
-def test_structured_value_is_where_the_worst_plant_breaks_the_bound():
+def test_structured_value_marks_the_worst_plant_that_violates_the_bound():
     loop, k = _loop("mu"), 230
     value = DESIGN.structured_value(loop)[k]
     asked = abs(DESIGN.performance(1j * FREQUENCIES[k]))
@@ -87,13 +87,13 @@ def test_sampled_loops_are_stable_over_the_sector():
             assert np.max(np.abs(np.linalg.eigvals(loop))) < 1.0
 
 
-def test_a_slower_joint_has_the_same_loop_in_its_own_time():
+def test_loop_of_a_slower_joint_is_scaled_in_time():
     fast, slow = robust_controller("mu"), robust_controller("mu", pole=11.5)
     w = np.geomspace(0.1, 100.0, 20)
     np.testing.assert_allclose(slow(1j * 0.5 * w), fast(1j * w), rtol=1e-9)
 
 
-def test_reduction_keeps_the_gain_at_rest_and_its_bound():
+def test_reduction_keeps_the_static_gain_and_its_error_bound():
     system = from_roots([-4.0, -40.0], [-1.0, -5.0, -30.0, -200.0], 2.0)
     small, sizes = residualised(system, 2)
     w = np.geomspace(1e-3, 1e4, 200)
@@ -104,7 +104,7 @@ def test_reduction_keeps_the_gain_at_rest_and_its_bound():
         residualised(system, 5)
 
 
-def test_split_parts_add_up():
+def test_sum_of_split_parts_is_the_system():
     system = from_roots([-4.0], [-0.01, -5.0, -6.0, -3e4], 1.0)
     within, beyond = split(system, 0.1)
     w = np.geomspace(1e-3, 1e5, 50)
@@ -119,7 +119,7 @@ def test_split_parts_add_up():
 
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason="the extra is not there")
 @pytest.mark.filterwarnings("ignore")
-def test_synthesis_gives_the_frozen_loops_again():
+def test_synthesis_reproduces_the_frozen_loops():
     hinf, mu, rounds = synthesis.d_k_iteration(DESIGN)
     np.testing.assert_allclose(rounds, frozen()["mu_by_round"], rtol=1e-4)
     for kind, controller in (("hinf", hinf), ("mu", mu)):
@@ -127,7 +127,7 @@ def test_synthesis_gives_the_frozen_loops_again():
         assert made == pytest.approx(frozen()[kind]["mu_full"], rel=1e-4)
 
 
-def test_scale_is_fitted_and_its_inverse_stable():
+def test_fitted_scale_and_its_inverse_are_stable():
     wanted = np.abs(from_roots([-3.0, -90.0], [-12.0, -40.0], 1.5)(1j * FREQUENCIES))
     made = synthesis.fit_scale(wanted)
     assert np.max(made.poles().real) < 0.0 and np.max(made.zeros().real) < 0.0

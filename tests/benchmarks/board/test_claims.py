@@ -37,7 +37,7 @@ def verdict(row: dict[str, Any], paper: dict[str, Any] = PAPER) -> tuple[str, st
     return found.verdict, "; ".join(found.reasons)
 
 
-def test_ten_seeds_below_at_no_higher_cost_are_better() -> None:
+def test_ten_seeds_with_lower_error_at_no_higher_cost_are_better() -> None:
     found = claims.claim(learned(), PAPER)
     assert found is not None
     assert (found.verdict, found.reasons) == (claims.BETTER, ())

@@ -88,7 +88,7 @@ def test_rows_outside_the_round_and_with_few_seeds_are_apart(files: dict[str, st
     assert "P(improvement), public episodes" in outside
 
 
-def test_row_that_does_worse_unseen_is_marked(files: dict[str, str]) -> None:
+def test_row_with_higher_audit_error_is_marked(files: dict[str, str]) -> None:
     track = files[PAGE].split("\n## A short track\n")[1]
     line = cells_of(track, "pid")[0]
     assert line[0] == "3"
@@ -165,7 +165,7 @@ def test_verification_counts_only_for_the_row_with_its_checksum(
     assert words == ["verified 2026-01-03", "not verified yet"]
 
 
-def test_board_without_rows_states_that(tmp_path: Path) -> None:
+def test_board_without_rows_has_a_message(tmp_path: Path) -> None:
     written = leaderboard.write(tmp_path, tmp_path / "LEADERBOARD.md")
     assert summary.NO_ROWS in written[0].read_text()
     with pytest.raises(ValueError, match="no such folder of rows"):

@@ -84,7 +84,7 @@ ORDER = ["ppo", "inverse", "pid", "zero", "young", "outside"]
 
 
 @needs_browser
-def test_page_has_no_fault_and_loads_local_files(seen: dict[str, Any]) -> None:
+def test_page_is_valid_and_loads_only_local_files(seen: dict[str, Any]) -> None:
     assert seen["faults"] == []
     assert {"page.css", "board.js", "page.js"} <= {Path(name).name for name in seen["loaded"]}
     assert all(name.startswith("file:") for name in seen["loaded"])
@@ -114,7 +114,7 @@ def test_headings_name_episodes_and_unverified_columns(seen: dict[str, Any]) -> 
 
 
 @needs_browser
-def test_heading_sorts_within_groups_up_down_and_not(seen: dict[str, Any]) -> None:
+def test_heading_click_sorts_within_groups_up_down_and_resets(seen: dict[str, Any]) -> None:
     assert seen["up"] == ["inverse", "pid", "ppo", "zero", "young", "outside"]
     assert seen["down"] == ["zero", "ppo", "pid", "inverse", "young", "outside"]
     assert seen["none"] == ORDER

@@ -56,7 +56,7 @@ def test_rows_of_other_episodes_are_not_compared() -> None:
     assert standings.difference(first, other_task) is None
 
 
-def test_lists_keep_rows_outside_of_the_round_and_young_ones_apart() -> None:
+def test_rows_outside_the_round_or_with_few_seeds_are_listed_apart() -> None:
     first, _ = standings.tracks(fakes.board()).values()
     found = standings.listing(first)
     assert [views.name_of(row) for row in found.ranked] == ["ppo", "inverse", "pid", "zero"]
@@ -73,7 +73,7 @@ def test_without_a_round_all_rows_are_ranked_by_public_episodes() -> None:
     assert (found.split, found.outside, found.missing) == ("public", [], ())
 
 
-def test_ranks_are_of_the_audit_whatever_the_public_episodes_say() -> None:
+def test_ranks_follow_the_audit_and_not_the_public_episodes() -> None:
     ground = fakes.row("ground", 0.5e-3, audit=1.5e-3)
     honest = fakes.row("honest", 1.1e-3, audit=1.0e-3)
     assert places([ground, honest]) == {"honest": "1", "ground": "2"}
@@ -102,7 +102,7 @@ def test_score_of_row_in_round_is_its_audit_score() -> None:
     assert views.gap(fakes.row("outside", 2e-3)) is None
 
 
-def test_policies_that_differ_do_not_hide_that_each_does_worse_unseen() -> None:
+def test_spread_of_policies_does_not_hide_a_common_gap() -> None:
     ten = np.linspace(0.4e-3, 1.2e-3, 10)
     row = fakes.row("ppo", ten, audit=ten + 0.05e-3, kind="learned")
     gap = views.gap(row)
@@ -112,7 +112,7 @@ def test_policies_that_differ_do_not_hide_that_each_does_worse_unseen() -> None:
     assert views.is_worse_unseen(row)
 
 
-def test_episode_without_metric_in_one_training_seed_is_left_out_in_all() -> None:
+def test_episode_without_metric_in_one_training_seed_is_omitted_in_all() -> None:
     row = fakes.row("ppo", [1e-3, 3e-3], kind="learned", steady_state_error=1.0)
     first, *_ = row["episodes"]
     for episode in row["episodes"]:
@@ -140,7 +140,7 @@ def test_smooth_reference_score_excludes_steps() -> None:
     }
 
 
-def test_rank_changes_between_tracks_by_hand() -> None:
+def test_rank_changes_between_tracks_equal_those_by_hand() -> None:
     tracks = {name: standings.listing(rows).ranked for name, rows in tracks_of().items()}
     (found,) = standings.changes(tracks)
     assert found.tracks == ("short_nominal", "short_wrong_model")
@@ -160,11 +160,11 @@ def tracks_of() -> dict[str, list[dict]]:
     return standings.tracks(fakes.board())
 
 
-def test_one_track_alone_changes_nothing() -> None:
+def test_single_track_has_no_rank_changes() -> None:
     assert standings.changes({"short_nominal": [fakes.row("a", 1e-3)]}) == []
 
 
-def test_one_controller_in_two_tracks_has_no_order_to_compare() -> None:
+def test_single_controller_has_no_rank_correlation() -> None:
     tracks = {name: [fakes.row("a", 1e-3, track=name)] for name in ("nominal", "other")}
     (found,) = standings.changes(tracks)
     assert math.isnan(found.agreement[1])

@@ -124,7 +124,7 @@ def lasting(folder: Path) -> dict[str, object]:
     return {rows.name_of(path): comparable(read_record(path)) for path in rows.files(folder)}
 
 
-def test_changed_controller_reports_itself_until_the_next_round(board: Path) -> None:
+def test_changed_controller_is_self_reported_until_the_next_round(board: Path) -> None:
     first = draw(board, "trained", "low")
     old = rows.load(run_row(board, "low"))
     bench_fakes.write_policies(board / "policies", 0.02, 0.06)
@@ -222,6 +222,6 @@ def test_selecting_among_a_thousand_variants_gains_nothing() -> None:
     assert min(audited) > claimed
 
 
-def test_tracks_have_names_that_a_seed_can_be_derived_from() -> None:
+def test_scenario_names_contain_no_separator() -> None:
     tracks = scenarios.available().values()
     assert not [s.name for track in tracks for s in track.scenarios() if "|" in s.name]

@@ -93,7 +93,7 @@ def move(module: str, new: str, root: Path) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def test_docstrings_formatting_module_paths_renderer_and_diagnosis_void_nothing(
+def test_docstrings_formatting_module_paths_renderer_and_diagnosis_void_no_row(
     before: dict[str, dict[str, Any]], tmp_path: Path
 ) -> None:
     """In a copy of the packages all of these have changed."""
@@ -121,11 +121,11 @@ def test_docstrings_formatting_module_paths_renderer_and_diagnosis_void_nothing(
     assert json.loads(done.stdout) == before
 
 
-def test_title_voids_nothing() -> None:
+def test_changed_title_voids_no_row() -> None:
     assert short(NAMES[0], title="Another").digest == short(NAMES[0]).digest
 
 
-def test_reward_voids_nothing(
+def test_changed_reward_voids_no_row(
     before: dict[str, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = rollout.run
@@ -170,7 +170,7 @@ def test_parameter_changed_by_1e_9_voids_its_task(
     assert found[NAMES[1]] == []
 
 
-def test_metric_voids_the_tasks_that_use_it(
+def test_changed_metric_voids_the_tasks_that_use_it(
     before: dict[str, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tasks.of.cache_clear()
@@ -179,7 +179,7 @@ def test_metric_voids_the_tasks_that_use_it(
     assert changed(before) == {NAMES[0]: [], NAMES[1]: ["scores changed"]}
 
 
-def test_worst_case_rule_voids_all_tasks(
+def test_changed_worst_case_rule_voids_all_tasks(
     before: dict[str, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tasks.of.cache_clear()
@@ -188,14 +188,14 @@ def test_worst_case_rule_voids_all_tasks(
     assert changed(before) == {name: ["scores changed"] for name in NAMES}
 
 
-def test_scenario_voids_its_task(before: dict[str, dict[str, Any]]) -> None:
+def test_changed_scenario_voids_its_task(before: dict[str, dict[str, Any]]) -> None:
     track = short(NAMES[0], kwargs={"load_disturbance": 1.0})
     changes = tasks.of(track).identity.changes(before[NAMES[0]]["task"])
     assert [line.partition(":")[0] for line in changes][:1] == ["scenarios changed"]
 
 
 @pytest.mark.parametrize(("name", "controller"), CLASSICAL.items())
-def test_every_knob_shows_in_the_answers(name: str, controller: str) -> None:
+def test_every_knob_changes_the_recorded_actions(name: str, controller: str) -> None:
     track = short(name)
     (setting, *_) = tasks.of(track).settings
     (plain, *_) = artefacts.of(find(controller), track).answers
@@ -209,7 +209,7 @@ def test_every_knob_shows_in_the_answers(name: str, controller: str) -> None:
 
 
 @pytest.mark.parametrize(("factor", "voids"), [(1.0 + 1e-8, False), (1.0 + 1e-4, True)])
-def test_rounding_of_a_design_is_no_change(
+def test_rounding_of_a_design_does_not_change_its_identity(
     factor: float, voids: bool, before: dict[str, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answers = behaviour.answers
@@ -256,7 +256,7 @@ def test_fixed_actions_are_exact_and_within_the_range() -> None:
 
 
 @pytest.mark.parametrize("answers", [np.zeros((0, 1)), np.array([[0.1], [np.nan]])])
-def test_packed_answers_keep_every_bit(answers: Any) -> None:
+def test_packed_actions_keep_every_bit(answers: Any) -> None:
     packed = behaviour.pack(answers.astype(np.float32))
     found = behaviour.unpack(json.loads(json.dumps(packed)))
     assert np.array_equal(found, answers.astype(np.float32), equal_nan=True)
@@ -264,9 +264,7 @@ def test_packed_answers_keep_every_bit(answers: Any) -> None:
     assert behaviour.difference(found, found[:-1] if len(found) else np.ones((1, 1))) == np.inf
 
 
-def test_answers_that_are_not_finite_identify_a_controller(
-    folder: Path, track: ScenarioSet
-) -> None:
+def test_non_finite_actions_identify_a_controller(folder: Path, track: ScenarioSet) -> None:
     refused = artefacts.of(find("refused"), track)
     assert np.isnan(refused.answers[0]).all()
     assert refused.changes(refused.record()) == []

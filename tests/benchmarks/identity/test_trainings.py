@@ -74,7 +74,7 @@ def test_seeds_that_are_not_independent_trainings_make_no_row(what: str, board: 
     )
 
 
-def test_round_takes_no_copies(board: Path) -> None:
+def test_round_refuses_copied_policies(board: Path) -> None:
     CHANGES["copied"][0](board)
     with pytest.raises(ValueError, match="are one policy"):
         draw(board, "trained")

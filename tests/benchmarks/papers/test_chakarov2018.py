@@ -28,7 +28,7 @@ INPUTS = (figures.filling, figures.hysteresis, figures.small_motions)
 
 
 @pytest.mark.parametrize("group", figures.GROUPS, ids=lambda group: group.__name__)
-def test_every_figure_is_met_or_named_here(group: Callable[[], list[Figure]]) -> None:
+def test_only_the_listed_figures_miss(group: Callable[[], list[Figure]]) -> None:
     made = list(group())
     assert made
     assert {f.name for f in made if f.passed is False} <= MISSED
@@ -39,7 +39,7 @@ def test_every_figure_is_met_or_named_here(group: Callable[[], list[Figure]]) ->
         assert (figure.published == figure.published) == (printed or "input" in figure.note)
 
 
-def test_torques_of_the_table_are_judged_within_two_hundredths() -> None:
+def test_tabulated_torques_are_judged_within_two_hundredths() -> None:
     torques = [f for f in figures.torque_table() if f.unit == "N m"]
     assert len(torques) == 9
     assert all(f.passed and f.tolerance == 0.02 for f in torques)
@@ -79,7 +79,7 @@ def test_snippet_reaches_desired_torque_and_stiffness(capsys: pytest.CaptureFixt
     assert "2.000000 N m and 4.000000 N m/rad" in capsys.readouterr().out
 
 
-def test_force_law_as_printed_and_as_read() -> None:
+def test_force_law_as_printed_and_as_read_has_the_tabulated_values() -> None:
     for n in (1, 2, 3, 4):
         made = [figures.printed_bundle(n), figures.bundle(n, 0.33)]
         assert row(str(n)) == [f"{float(m.law(4e5, 0.0)):.0f} N" for m in made]
@@ -91,7 +91,7 @@ def test_force_law_as_printed_and_as_read() -> None:
     assert f"that ends at 28 % has {braid:.2f} N/(m2 kPa)" in PAGE.flat
 
 
-def test_torque_and_stiffness() -> None:
+def test_torque_and_stiffness_have_the_expected_values() -> None:
     plant, q = figures.orthosis(), np.radians(figures.DEGREES)
     for a, b in figures.TORQUES:
         made = [f"{t:.2f}" for t in plant.torque(q, a, b)]
@@ -129,7 +129,7 @@ def test_stiffness_of_small_motions() -> None:
 
 
 @pytest.mark.parametrize("name", ["elbow_pid", "elbow_pid_hysteresis", "elbow_allocation"])
-def test_table_of_environment_page_roughly(name: str) -> None:
+def test_table_of_environment_page_is_approximate(name: str) -> None:
     """One of the four episodes that a cell is the mean of."""
     env: Any = gym.make("PAM/ElbowOrthosis-v0", reference="free", motion="sines",
                         episode_seconds=6.0).unwrapped  # fmt: skip

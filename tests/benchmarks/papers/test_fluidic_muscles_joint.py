@@ -75,7 +75,7 @@ def ratios() -> dict[tuple[str, float, bool], Figure]:
 # --- studies ---------------------------------------------------------------------------------
 
 
-def test_exact_figures_of_the_pi() -> None:
+def test_figures_of_the_pi_are_exact() -> None:
     exact = studies.step_figures(*papers_joint.nominal_step())
     assert exact.overshoot == pytest.approx(4.32, abs=0.005)
     assert exact.rise == pytest.approx(0.1321, abs=5e-5)
@@ -273,7 +273,7 @@ def test_page_has_the_ratios_and_the_sentence_on_them() -> None:
     assert "1.2 is reached at 5 degrees after a turn on all three plants" in PAGE.flat
 
 
-def test_text_between_the_tables() -> None:
+def test_text_of_the_page_states_the_measured_numbers() -> None:
     bare = Setting(width=0.0)
     pair = [step(n, bare).rise for n in ("joint_pi", "joint_mfc_mu")]
     assert f"PI rises in {pair[0]:.3f} s and model-following in {pair[1]:.3f} s" in PAGE.flat

@@ -58,7 +58,7 @@ def test_calibrated_paths_are_inputs_and_the_known_one_is_judged() -> None:
     assert judged == ["path_3, unweighted: largest angle", "path_3, weighted: largest angle"]
 
 
-def test_one_ninth_of_drawn_paths_exceeds_the_limit_and_none_with_weight() -> None:
+def test_one_ninth_of_unweighted_drawn_paths_exceeds_the_limit() -> None:
     found = figures.held_out()
     assert found.paths == 500
     assert found.crossed == pytest.approx(0.112)

@@ -33,12 +33,12 @@ def record() -> dict[str, np.ndarray]:
     }
 
 
-def test_spans_are_where_the_flags_are_set() -> None:
+def test_spans_cover_the_set_flags() -> None:
     found = spans(np.array([1.0, 1.0, 0.0, 0.0, 1.0]), 0.5 * np.arange(5))
     assert found == [(0.0, 1.0), (2.0, 2.5)]
 
 
-def test_clock_of_a_cut_begins_at_heel_contact() -> None:
+def test_time_of_a_cut_starts_at_heel_contact() -> None:
     made = cut(record(), 9.2, 15.4)
     assert made["time"][0] == pytest.approx(-0.8, abs=0.011)
     first = np.flatnonzero(made["state/stance"] > 0.5)[0]

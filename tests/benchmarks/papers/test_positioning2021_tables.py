@@ -122,7 +122,7 @@ REFITTED_FORWARD = {
 
 
 @pytest.mark.parametrize("equation", PUBLISHED_FORWARD)
-def test_forward_equations_as_printed(equation):
+def test_errors_of_forward_equations_as_printed(equation):
     *residuals, determination = PUBLISHED_FORWARD[equation]
     *found, fitted = _forward_errors(curves.PUBLISHED_FORWARD)[equation - 1]
     assert found == pytest.approx(residuals, abs=MILLI)
@@ -130,7 +130,7 @@ def test_forward_equations_as_printed(equation):
 
 
 @pytest.mark.parametrize("equation", REFITTED_FORWARD)
-def test_forward_equations_refitted(equation):
+def test_errors_of_refitted_forward_equations(equation):
     coefficients, residuals = REFITTED_FORWARD[equation]
     refit = curves.fitted_forward(TABLE)
     found = refit.reshape(6, 4)[equation - 1, ::-1]
@@ -146,7 +146,7 @@ def test_equation_3_is_a_copy_of_equation_1_and_its_refit_has_the_claimed_determ
     assert refit[2][2] == pytest.approx(0.997, abs=5e-4)
 
 
-def test_equation_5_is_good_to_4_bar_and_low_above():
+def test_equation_5_fits_up_to_4_bar_and_is_low_above():
     pressure, inflated, _ = _mean_loop(4.55)
     error = np.polyval(curves.PUBLISHED_FORWARD[2, 0], pressure) - inflated
     assert np.abs(error[pressure <= 4.0]).max() <= 0.16 + 1e-3
@@ -175,7 +175,7 @@ INVERSE_ON_TABLE_6 = {
 
 
 @pytest.mark.parametrize("equation", INVERSE_ON_TABLE_6)
-def test_inverse_equations_on_table_6(equation):
+def test_errors_of_inverse_equations_on_table_6(equation):
     rms, largest, coefficients, refitted = INVERSE_ON_TABLE_6[equation]
     printed = _table_6_errors(curves.PUBLISHED_INVERSE)[equation - 7]
     assert printed[:2] == pytest.approx((rms, largest), abs=MILLI)
@@ -232,7 +232,7 @@ def test_printed_equation_11_is_worse_than_ignoring_the_hysteresis(positioning):
     assert positioning["published"].per_equation[inflating_at_4_55_kg] > 3.0 * ignoring
 
 
-def test_pchip_reaches_what_the_repeats_allow(positioning):
+def test_pchip_error_equals_the_repeatability(positioning):
     cycles = [TABLE.cycles(load)[1] / MM for load in TABLE.loads]
     away = [(x - x.mean(axis=1, keepdims=True)) * x.shape[1] / (x.shape[1] - 1) for x in cycles]
     floor = np.sqrt(np.mean(np.concatenate(away) ** 2))  # of a repeat from the mean of the others
@@ -250,7 +250,7 @@ def test_inverses_of_curves_rise_with_the_contraction(make):
             assert -1e-6 <= pressure.min() < pressure.max() <= 6e5 + 1e-6
 
 
-def test_pchip_gives_back_the_readings_it_was_made_from():
+def test_pchip_reproduces_its_readings():
     inverse = curves.pchip_inverse(TABLE)
     for load in TABLE.loads:
         for inflating in curves.BRANCHES:

@@ -78,7 +78,7 @@ def test_bandwidth_of_10_hz_gives_the_same_figure():
     assert seed.refit_controller(20.0 * math.pi).largest_error < 6.5e-4
 
 
-def test_both_plants_fit_the_same_measurement():
+def test_both_plants_fit_the_same_frequency_response():
     w = np.linspace(0.6, 20.0, 200)
     ratio = seed.refit_controller().design.plant(1j * w) / PLANT(1j * w)
     assert 0.92 < np.min(np.abs(ratio)) < np.max(np.abs(ratio)) < 1.14
@@ -104,7 +104,7 @@ def test_without_lag_the_inverse_is_exact():
     assert line > 9.0
 
 
-def test_without_hysteresis_the_line_is_as_good():
+def test_without_hysteresis_the_line_equals_the_inverse():
     inverse, line = figures.stiffness_tracking(friction=0.0)
     assert inverse == pytest.approx(line, rel=1e-9)
 
@@ -171,7 +171,7 @@ def test_table_contains_figures_of_all_groups():
         (None, {}, "not computed"),
     ],
 )
-def test_figure_is_judged_by_expected_value_and_bounds(ours, more, verdict):
+def test_figure_is_judged_by_its_expected_value_and_bounds(ours, more, verdict):
     assert Figure("a", ours, published=3.5, **more).verdict == verdict
 
 
@@ -208,7 +208,7 @@ def test_uncalibrated_proxy_at_the_papers_pace():
     assert gait.uncalibrated_change("walk", 1.224) > 0.0
 
 
-def test_switch_is_small_with_and_large_without_bumpless_transfer():
+def test_bumpless_transfer_reduces_the_transient_of_a_switch():
     (soft, jump), (hard, plain_jump) = (gait.linear_switch(10.0, b) for b in (True, False))
     assert soft < 15.0 < 40.0 < hard
     assert jump < 10.0 < 150.0 < plain_jump
@@ -218,7 +218,7 @@ def test_switch_is_small_with_and_large_without_bumpless_transfer():
     ("width", "feedback", "line", "over_line"),
     [(0.0, 5.06, 0.95, 1.0), (0.25e5, 5.20, 1.31, 1.3), (0.5e5, 5.37, 1.69, 1.6)],
 )
-def test_printed_feedback_with_two_feed_forwards(
+def test_errors_of_printed_feedback_with_either_feedforward(
     width: float, feedback: float, line: float, over_line: float
 ) -> None:
     errors = studies.tension_errors(width)
@@ -229,11 +229,11 @@ def test_printed_feedback_with_two_feed_forwards(
     assert errors.with_line / errors.with_inverse == pytest.approx(over_line, abs=0.1)
 
 
-def test_designed_feedback_does_no_worse_than_the_printed_one() -> None:
+def test_designed_feedback_is_at_least_as_good_as_the_printed_one() -> None:
     assert studies.tension_errors(feedback="designed").with_inverse < 1.05
 
 
-def test_switch_with_and_without_bumpless_transfer() -> None:
+def test_transient_of_a_switch_with_and_without_bumpless_transfer() -> None:
     smooth, bumpy = (studies.switching(10.0, bumpless=b) for b in (True, False))
     assert smooth.tension < 15.0 < 40.0 < bumpy.tension
     assert smooth.excess < 0.5 * bumpy.excess
@@ -250,7 +250,7 @@ def test_switch_with_and_without_bumpless_transfer() -> None:
         ("stairs_down", (0.800, 0.850, 0.729, 0.731)),
     ],
 )
-def test_emg_as_delivered_in_the_environment(activity, expected) -> None:
+def test_emg_reductions_of_the_assistance_delivered_in_the_environment(activity, expected) -> None:
     ratios = studies.emg_ratios(activity)
     names = ("extensors_ratio", "ratio", "extensors_ratio_fitted_a", "extensors_ratio_fitted_b")
     assert [ratios[f"emg_{name}"] for name in names] == pytest.approx(expected, abs=0.01)

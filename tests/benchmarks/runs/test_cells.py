@@ -83,7 +83,7 @@ def test_group_is_of_one_policy_in_one_scenario(track: ScenarioSet) -> None:
     assert [group.cells for group in made] == [*zip([plain, *other], audited, strict=True)]
 
 
-def test_cancelled_cell_ends(track: ScenarioSet, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cancelled_cell_is_stopped(track: ScenarioSet, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = track.scenarios()[0]
     cell = cells.Cell(find("low"), track, scenario, seeds=track.seeds[scenario.name])
     asked = iter([False])

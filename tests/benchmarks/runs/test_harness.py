@@ -133,7 +133,7 @@ def test_board_is_a_function_of_the_rows(track: ScenarioSet, folder: Path) -> No
     assert text.index("`integral`") < text.index("`middle`")
 
 
-def test_metrics_against_known_answers() -> None:
+def test_metrics_of_known_episodes() -> None:
     t = 0.01 * np.arange(1000)
     error = 2e-3 * np.sin(2 * np.pi * t)
     assert metrics.rms(error) == pytest.approx(2e-3 / np.sqrt(2), rel=1e-3)

@@ -65,7 +65,7 @@ def test_controllers_without_model_knowledge_do_not_depend_on_the_model(
     env.close()
 
 
-def test_controller_of_a_model_depends_on_it() -> None:
+def test_model_based_controller_depends_on_its_model() -> None:
     env = make_env("PAM/MusclePositioning-v0", {})
     assert uses_model("pid", env)
     env.close()
@@ -96,7 +96,7 @@ class Policy:
         self.card = {"plants": plants, "env_kwargs": env_kwargs}
 
 
-def test_policy_that_met_an_undeclared_plant_was_trained_on_it() -> None:
+def test_policy_trained_on_an_undeclared_plant_is_reported_as_such() -> None:
     name, ppo = "PAM/MusclePositioning-v0", find("ppo")
     env, drawn = make_env(name, {"hysteresis": "preisach"}), make_env(name, {"randomize": True})
     plant, nominal = env.unwrapped.plant, drawn.unwrapped.plant

@@ -56,7 +56,7 @@ def test_failure_of_a_controller_is_recorded_with_its_message(env, thing, words)
     assert len(episode.actions) == 0
 
 
-def test_long_message_is_cut(env):
+def test_long_message_is_truncated(env):
     episode = rollout.run(env, Gives(RuntimeError("x" * 10_000)), 1)
     assert len(episode.failure) == rollout.LONGEST
     assert episode.failure.endswith("...")
@@ -154,7 +154,7 @@ def test_controller_whose_rows_depend_on_each_other_is_run_alone(controller, bat
     assert controller.batches == batches
 
 
-def test_rows_end_at_their_own_time():
+def test_rows_of_a_batch_end_independently():
     together = compared("PAM/RedundantManipulator-v0", SWINGS, Rows(swing=25))
     lengths = [len(episode.actions) for episode in together]
     assert all(episode.failed for episode in together)
@@ -167,7 +167,7 @@ def test_failure_in_a_batch_has_the_message_of_a_single_episode(thing):
     assert all(episode.failed for episode in together)
 
 
-def test_answers_are_timed_for_single_observations():
+def test_actions_are_timed_for_single_observations():
     (episode, *_) = compared("PAM/MusclePositioning-v0", SHORT, Rows())
     assert len(episode.seconds) == 2 * 20
     assert (episode.seconds > 0.0).all()

@@ -155,7 +155,7 @@ def test_duplicate_row_is_refused(classical: dict[str, Any]) -> None:
         rows.check_together([classical, classical])
 
 
-def test_no_rows_are_no_error(tmp_path: Path) -> None:
+def test_folder_without_rows_loads_as_empty(tmp_path: Path) -> None:
     assert rows.load_all(tmp_path / "none") == []
 
 

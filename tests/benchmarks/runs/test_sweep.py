@@ -204,7 +204,7 @@ def test_dry_run_lists_cells_and_runs_none(
     assert capsys.readouterr().out.splitlines()[-1] == "2 cells, 2 to run"
 
 
-def test_exit_codes(
+def test_exit_code_and_message_state_the_kind_of_failure(
     ask: Callable[..., int], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def wrong(*_: object) -> None:

@@ -72,7 +72,7 @@ def fails(knobs: Knobs) -> Measured:
     raise AssertionError("nothing is left to measure")
 
 
-def test_published_numbers_stay_where_no_trial_is_better(tmp_path):
+def test_published_parameters_are_kept_if_no_trial_is_better(tmp_path):
     def worse_if_changed(knobs: Knobs) -> Measured:
         return dataclasses.replace(PLAIN, error=2.0 if knobs else 1.0)
 
@@ -134,7 +134,7 @@ def short() -> ScenarioSet:
     return ScenarioSet(content)
 
 
-def test_course_scores_as_the_board_does_and_applies_knobs(short):
+def test_tuning_episodes_are_scored_like_the_board_with_knobs_applied(short):
     course = Course("pid", short, episodes=4)
     plain = course.measure({})
     assert course.measure({}) == plain == course.measure({"reach": 1.0})

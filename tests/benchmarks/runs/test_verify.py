@@ -170,7 +170,7 @@ FORGERIES: dict[str, tuple[str, Change, str]] = {
 
 
 @pytest.mark.parametrize("what", FORGERIES)
-def test_forged_entry_is_found(what: str, forged: Any) -> None:
+def test_forged_entry_is_detected(what: str, forged: Any) -> None:
     name, change, words = FORGERIES[what]
     assert_drifted(forged(name, change), words)
 
@@ -181,7 +181,7 @@ def test_changed_description_is_a_note(forged: Any) -> None:
     assert any(note.startswith("description.summary: 'another'") for note in verdict.notes)
 
 
-def test_swapped_policy_is_found(board: Path) -> None:
+def test_swapped_policy_is_detected(board: Path) -> None:
     try:
         bench_fakes.write_policies(board / "policies", 0.02, 0.0500001)
         verdict = verdict_of(board, "trained")
@@ -193,7 +193,7 @@ def test_swapped_policy_is_found(board: Path) -> None:
     assert why == ["policy files changed"]
 
 
-def test_turned_knob_voids_exactly_the_rows_of_its_controller(board: Path) -> None:
+def test_changed_knob_voids_exactly_the_rows_of_its_controller(board: Path) -> None:
     try:
         bench_fakes.write_knobs(board / "policies", tuned={"gain": 0.020000001}, other={"lead": 2})
         why = {n: verify.void(rows.load(path_of(board, n))) for n in ("tuned", "integral")}
@@ -204,7 +204,7 @@ def test_turned_knob_voids_exactly_the_rows_of_its_controller(board: Path) -> No
     assert_drifted(verdict, "knob gain changed")
 
 
-def test_row_of_another_controller_is_found(board: Path) -> None:
+def test_row_of_another_controller_is_detected(board: Path) -> None:
     path = path_of(board, "low")
     row = read_record(path_of(board, "integral"))
     row["controller"]["name"], row["row"] = "low", "tiny--low"
@@ -237,7 +237,7 @@ def test_row_of_another_environment_version_is_refused(forged: Any) -> None:
 
 
 @pytest.mark.parametrize("honest", [False, True])
-def test_environment_and_code_that_a_row_names_are_not_run(
+def test_environment_and_code_named_by_a_row_are_not_executed(
     honest: bool, forged: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """A row may hold digests that fit its own content: none of it is imported."""
@@ -256,7 +256,7 @@ def test_environment_and_code_that_a_row_names_are_not_run(
     assert not mark.exists()
 
 
-def test_names_with_a_path_are_not_read(forged: Any) -> None:
+def test_names_containing_a_path_are_refused(forged: Any) -> None:
     verdict = forged("integral", lambda row: row.update(row="../../../escaped"), loads=False)
     assert_drifted(verdict, "file, row, track and controller have to agree")
 
@@ -268,13 +268,13 @@ def test_missing_entries_are_named(forged: Any) -> None:
     assert_drifted(verdict, "cannot be run again: there is no 'split'")
 
 
-def test_audit_without_a_round_is_found(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_audit_without_a_round_is_detected(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(audit, "FILE", board / "none.json")
     words = "the last round of tiny (no round was drawn); run `python -m benchmarks audit tiny`"
     assert_drifted(verdict_of(board, "trained"), words)
 
 
-def test_damaged_file_is_found(board: Path, tmp_path: Path) -> None:
+def test_damaged_file_is_detected(board: Path, tmp_path: Path) -> None:
     path = rows.path_of("tiny--integral", tmp_path)
     path.parent.mkdir()
     row = read_json(path_of(board, "integral"))
@@ -309,7 +309,7 @@ def rounding(predict: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @pytest.mark.parametrize("name", ["trained", "tuned", "integral"])
-def test_elsewhere_a_row_is_reproduced_within_tolerance(
+def test_row_is_reproduced_within_tolerance_on_another_machine(
     name: str, board: Path, elsewhere: None
 ) -> None:
     verdict = verdict_of(board, name)
@@ -318,7 +318,7 @@ def test_elsewhere_a_row_is_reproduced_within_tolerance(
     assert verify.void(rows.load(path_of(board, name))) == []  # still in its round
 
 
-def test_elsewhere_another_design_is_not_that_of_the_round(
+def test_other_design_on_another_machine_is_not_that_of_the_round(
     board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     make = bench_fakes.make_controller
@@ -333,7 +333,7 @@ def test_elsewhere_another_design_is_not_that_of_the_round(
     assert_drifted(verdict_of(board, "tuned"), "audit: task and controller are not those of")
 
 
-def test_elsewhere_scores_near_zero_may_differ(
+def test_scores_near_zero_may_differ_on_another_machine(
     board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     score = metrics.score
@@ -361,7 +361,7 @@ FOUND_ELSEWHERE: dict[str, tuple[Change, str]] = {
 
 
 @pytest.mark.parametrize("what", FOUND_ELSEWHERE)
-def test_forgery_beyond_rounding_is_found_elsewhere(what: str, forged: Any) -> None:
+def test_forgery_beyond_rounding_is_detected_on_another_machine(what: str, forged: Any) -> None:
     """A row that falsely says that it was made elsewhere gains nothing."""
 
     def change(row: Row) -> None:
@@ -373,7 +373,7 @@ def test_forgery_beyond_rounding_is_found_elsewhere(what: str, forged: Any) -> N
     assert_drifted(verdict, FOUND_ELSEWHERE[what][1])
 
 
-def test_metric_that_does_not_apply_is_no_drift(
+def test_inapplicable_metric_is_not_drift(
     board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     score = metrics.score
@@ -383,7 +383,7 @@ def test_metric_that_does_not_apply_is_no_drift(
     assert verify.verify(path).holds
 
 
-def test_commands_print_outcomes_and_note_them(
+def test_commands_print_and_record_outcomes(
     board: Path, forged: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     honest, other = (str(path_of(board, name)) for name in ("integral", "raises"))
@@ -410,7 +410,7 @@ def test_commands_print_outcomes_and_note_them(
         assert "there is no row 'tiny--nobody'" in capsys.readouterr().err
 
 
-def test_row_once_reproduced_to_the_last_bit_keeps_that_note(tmp_path: Path) -> None:
+def test_bit_exact_verification_is_kept_after_a_tolerant_one(tmp_path: Path) -> None:
     path = rows.path_of("a--b", tmp_path)
 
     def noted(checksum: str, mode: str) -> str | None:

@@ -86,7 +86,7 @@ def test_each_metric_responds_to_its_own_error() -> None:
 
 
 @pytest.mark.parametrize("name", [n for n in available() if n.startswith("elbow")])
-def test_tracks_have_a_worst_case_of_every_metric_and_columns_of_theirs(name: str) -> None:
+def test_tracks_have_worst_cases_and_columns_for_every_metric(name: str) -> None:
     content = available()[name].content
     expected = set(metrics.of_track(content))
     assert set(content["worst_case"]) == expected

@@ -77,7 +77,7 @@ def test_sensed_and_model_errors_are_scored_beside_the_headline() -> None:
     assert modelled["model_rms_error"] == pytest.approx(0.03)
 
 
-def test_shares_of_time_are_of_the_window_after_settling() -> None:
+def test_shares_of_time_refer_to_the_window_after_settling() -> None:
     short = (TIME <= 6.0).astype(float)
     scores = score(joint(saturated=short, **{"state/slack": 2.0 * short}), "joint")
     assert scores["saturated_time"] == pytest.approx(0.5)
@@ -121,7 +121,7 @@ def test_tool_is_scored_after_settling_only() -> None:
     assert score(chain(**early), "chain")["tool_rms_error"] == 0.0
 
 
-def test_steady_state_error_of_tip_is_scored_where_its_path_rests() -> None:
+def test_steady_state_error_of_tip_is_scored_while_its_path_rests() -> None:
     moving = np.clip(TIME - 3.0, 0.0, 2.0)  # 3 s to 5 s; it counts as at rest from 5.5 s on
     off = np.where((TIME > 2.5) & (TIME < 5.5), 0.02, 1e-3)
     record = chain(output=off, **{f"state/{r}point_x": moving for r in ("", "reference_")})
@@ -200,7 +200,7 @@ def test_episode_records_model_output_at_the_same_instants(name: str, joints: in
 
 
 @pytest.mark.parametrize("name", sorted(TRACKS))
-def test_tracks_name_signals_that_there_are(name: str) -> None:
+def test_tracks_name_existing_signals(name: str) -> None:
     track: ScenarioSet = TRACKS[name]
     keys = gym.make(track.env).unwrapped.setup.info_keys
     assert track.content["sensed"] in keys

@@ -67,7 +67,7 @@ def score(record: dict[str, np.ndarray], **how: Any) -> dict[str, float]:
     return metrics.score(record, PERIOD, content | how)
 
 
-def test_perfect_record_has_no_error_and_the_ratios_that_were_put_in() -> None:
+def test_perfect_record_has_no_error_and_the_constructed_ratios() -> None:
     scores = score(signals())
     assert set(scores) == set(metrics.of_track({"metrics": ["range", "gait"]}))
     for name in ("rms_error", "rms_percent", "angle_rms", "switch_error", "torque_rms"):
@@ -121,7 +121,7 @@ def test_open_valve_does_not_reduce_emg() -> None:
     assert ratios["emg_ratio_fitted_a"] == pytest.approx(1.66, abs=0.03)
 
 
-def test_reading_b_makes_little_of_a_small_torque_that_is_held_against_for_long() -> None:
+def test_reading_b_gives_little_emg_for_a_small_sustained_torque() -> None:
     """All of Eq. (1) as demand, and a power of 2: the flexors' 15 N m are a tenth of the peak."""
     demand = np.where(STANCE > 0.5, 50.0, 0.0)
     open_valve = np.full(N, 15.0)
@@ -141,7 +141,7 @@ def test_gate_that_never_opens_is_reported() -> None:
         score(signals(**{"state/stance": np.zeros(N)}))
 
 
-def test_landings_are_first_samples_of_stance_after_a_swing() -> None:
+def test_landings_are_the_first_samples_of_stance_after_swing() -> None:
     stance = np.zeros(400)
     stance[100:200] = 1.0
     stance[205:210] = 1.0  # a heel that chatters as it is lifted
@@ -149,7 +149,7 @@ def test_landings_are_first_samples_of_stance_after_a_swing() -> None:
     np.testing.assert_array_equal(metrics_knee.landings(stance, PERIOD), [100, 300])
 
 
-def test_jumps_are_the_mean_over_landings_of_the_largest_that_follows() -> None:
+def test_jump_is_the_mean_over_landings_of_the_largest_subsequent_change() -> None:
     record, starts = signals(), np.flatnonzero(np.diff(STANCE) > 0.0) + 1
     first, second = starts
     for k, size, change in ((first, 30.0, 1e4), (second, 10.0, 3e4)):

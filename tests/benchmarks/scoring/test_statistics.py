@@ -9,13 +9,13 @@ from scipy import stats
 from benchmarks.scoring import statistics
 
 
-def test_interquartile_mean_by_hand() -> None:
+def test_interquartile_mean_equals_the_one_by_hand() -> None:
     # of eight the middle four: (2 + 3 + 4 + 5) / 4
     samples = np.array([[100.0, 2.0, 3.0, 4.0, 5.0, 1.0, 0.0, 50.0]])
     assert statistics.interquartile_mean(samples)[0] == 3.5
 
 
-def test_probability_of_improvement_by_hand() -> None:
+def test_probability_of_improvement_equals_the_one_by_hand() -> None:
     # two training seeds against one run, in three episodes: below twice, a tie, above
     first = np.array([[1.0, 5.0, 2.0], [2.0, 5.0, 9.0]])
     second = np.array([[3.0, 5.0, 4.0]])
@@ -39,7 +39,7 @@ def test_probability_of_improvement_is_mann_whitney_averaged_over_tasks() -> Non
     assert found.low < found.value < found.high
 
 
-def test_certain_improvement_has_no_spread_and_one_seed_in_two_has_full_spread() -> None:
+def test_certain_improvement_has_a_point_interval_and_one_seed_in_two_a_full_one() -> None:
     always = statistics.probability_of_improvement(np.zeros((10, 6)), np.ones((1, 6)), [0, 1] * 3)
     assert always == statistics.Interval(1.0, 1.0, 1.0)
     half = np.repeat([[0.0], [2.0]], 6, axis=1)
@@ -47,7 +47,7 @@ def test_certain_improvement_has_no_spread_and_one_seed_in_two_has_full_spread()
     assert (found.value, found.low, found.high) == (0.5, 0.0, 1.0)
 
 
-def test_scenarios_are_drawn_again_as_wholes() -> None:
+def test_bootstrap_resamples_whole_scenarios() -> None:
     # below in all of one scenario and in none of the other: one of two is drawn
     second = np.ones((1, 10))
     first = np.repeat([[0.0, 2.0]], 5, axis=1)
@@ -55,7 +55,7 @@ def test_scenarios_are_drawn_again_as_wholes() -> None:
     assert (found.value, found.low, found.high) == (0.5, 0.0, 1.0)
 
 
-def test_performance_profile_by_hand() -> None:
+def test_performance_profile_equals_the_one_by_hand() -> None:
     scores = np.array([[1.0, 2.0], [3.0, 2.0]])
     found = statistics.performance_profile(scores, [0.5, 1.0, 2.0, 2.5, 3.0])
     assert found.tolist() == [0.0, 0.25, 0.75, 0.75, 1.0]
@@ -66,7 +66,7 @@ def interval(samples: np.ndarray, strata: object, **how: int) -> statistics.Inte
     return statistics.of_table(np.asarray(samples, float)[None], strata, **how)
 
 
-def test_interval_is_that_of_students_t_within_strata() -> None:
+def test_interval_is_students_t_within_strata() -> None:
     sample, strata = np.random.default_rng(0).normal(3.0, 1.0, 400), np.zeros(400, int)
     exact = stats.t.interval(0.95, 399, sample.mean(), stats.sem(sample))
     found = interval(sample, strata)
@@ -79,7 +79,7 @@ def test_interval_is_that_of_students_t_within_strata() -> None:
     assert split.high - split.low < 0.3
 
 
-def test_training_seeds_widen_an_interval_as_their_scatter_says() -> None:
+def test_interval_includes_the_scatter_of_training_seeds() -> None:
     # seeds differ by normal offsets, episodes do not: the interval is that of the mean of ten seeds
     offsets = np.random.default_rng(1).normal(0.0, 1.0, 10)
     table, strata = np.repeat(offsets[:, None], 6, axis=1), [0, 0, 0, 1, 1, 1]
@@ -106,7 +106,7 @@ def test_training_seed_with_missing_episode_is_refused() -> None:
         statistics.crossed(np.ones(3), [0, 0, 1], ["a", "b", "a"])
 
 
-def test_paired_differences_see_what_overlapping_intervals_hide() -> None:
+def test_paired_difference_is_significant_despite_overlapping_intervals() -> None:
     # hard and easy episodes differ by far more than the two controllers do
     random = np.random.default_rng(4)
     hardness = random.uniform(1.0, 10.0, (1, 20))
@@ -119,7 +119,7 @@ def test_paired_differences_see_what_overlapping_intervals_hide() -> None:
     assert found.high < 0.11
 
 
-def test_differences_of_several_training_seeds_by_hand() -> None:
+def test_differences_of_several_training_seeds_equal_those_by_hand() -> None:
     first, second = np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[1.0, 1.0]])
     found = statistics.difference_of_tables(first, second, ["a", "b"])
     assert found.value == pytest.approx(1.5)
@@ -127,7 +127,7 @@ def test_differences_of_several_training_seeds_by_hand() -> None:
     assert (found.low, found.high) == (pytest.approx(0.5), pytest.approx(2.5))
 
 
-def test_equal_scores_give_equal_intervals_whatever_was_asked_before() -> None:
+def test_intervals_do_not_depend_on_previous_calls() -> None:
     random = np.random.default_rng(5)
     first, second = random.normal(size=(10, 12)), random.normal(size=(1, 12))
     strata = np.repeat([0, 1, 2], 4)
@@ -161,7 +161,7 @@ def test_interval_has_its_coverage_with_independent_scenario_seeds() -> None:
     assert 0.925 <= share <= 0.965  # 400 resamples give 0.94; a standard error is 0.004
 
 
-def test_one_seed_in_all_scenarios_would_make_the_interval_far_too_narrow() -> None:
+def test_shared_seed_across_scenarios_makes_the_interval_too_narrow() -> None:
     random = np.random.default_rng(8)
     assert np.mean([covered(random, 0.5) for _ in range(200)]) < 0.6
 

@@ -15,7 +15,7 @@ from benchmarks.speed.groups import measure
 @pytest.mark.parametrize(
     ("rest", "share", "verdict"), [(38.0, 0.05, "pass"), (18.0, 0.1, "MISSED")]
 )
-def test_environment_share_is_of_whole_rollout(
+def test_environment_share_refers_to_the_whole_rollout(
     monkeypatch: pytest.MonkeyPatch, rest: float, share: float, verdict: str
 ) -> None:
     now = [0.0]
@@ -57,7 +57,7 @@ def test_all_batches_of_a_preset_are_found(variant: str) -> None:
 
 
 @pytest.mark.parametrize(("rate", "verdict"), [(1999.0, "MISSED"), (2001.0, "pass"), (3e4, "aim")])
-def test_planning_has_a_floor(monkeypatch, rate: float, verdict: str) -> None:
+def test_planning_has_a_required_rate(monkeypatch, rate: float, verdict: str) -> None:
     def timed(subjects, rounds):
         assert subjects["poses"]() == 3 * 2 * 41 * probes.REPEATS
         return {"poses": [rate] * rounds}

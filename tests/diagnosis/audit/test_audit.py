@@ -538,7 +538,7 @@ def test_wrong_declared_noise_is_reported(factor, warned):
     assert (text in warnings(rig)) is warned
 
 
-def test_noise_below_the_resolution():
+def test_noise_below_the_resolution_is_replaced_by_the_rounding_error():
     """A reading that never moves within a hold has the error of its rounding."""
     columns = arrays(white=0.0)
     contraction = 1e-4 * np.round(columns["contraction"] / 1e-4)

@@ -133,7 +133,7 @@ def test_reasons_of_rivals_match_the_decision() -> None:
     assert [word in EXCLUDED for word in found] == [False, False, False, True, True]
 
 
-def test_without_a_name_every_rival_gains_too_little() -> None:
+def test_without_a_named_cause_no_rival_gains_enough() -> None:
     rival = candidate("leak")
     evidence = {"levels": [{"rivals": []}, {"rivals": [row(rival, 0.01, 1.0)]}]}
     decision = Decision("adequate", candidate(), [rival], [], {}, evidence)

@@ -109,7 +109,7 @@ def test_label_gives_kind_of_experiment(label: str, kind: str) -> None:
 
 
 @pytest.mark.parametrize("seconds", [30, 60, 120, 300])
-def test_white_noise_has_no_peak_and_a_hum_has(seconds: int) -> None:
+def test_spectrum_of_white_noise_has_no_peak_unlike_that_of_a_hum(seconds: int) -> None:
     period = 0.02
     time = np.arange(round(seconds / period)) * period
     for seed in range(20):

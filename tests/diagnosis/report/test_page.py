@@ -74,7 +74,7 @@ def test_figures_use_colours_of_the_page(html):
     assert "prefers-color-scheme: dark" in html
 
 
-def test_text_of_others_is_escaped():
+def test_text_from_users_is_escaped():
     made = fakes.diagnosis("named")
     evil = '<script>alert("x")</script> & $\\frac{$ <b onload=1>'
     made.report["text"] = evil
@@ -100,7 +100,7 @@ def without(*names):
 
 
 @pytest.mark.parametrize("channel", ["contraction", "pressure"])
-def test_one_output_alone(channel):
+def test_page_of_a_single_output(channel):
     made = fakes.diagnosis("named")
     other = "pressure" if channel == "contraction" else "contraction"
     for outputs in (made.traces.measured, made.traces.base, made.traces.extended):
@@ -135,7 +135,7 @@ def test_without_traces_the_figures_of_the_report_remain():
     assert set(draw(found, None)) == {"structure", "rivals", "kinds", "isolability"}
 
 
-def test_nothing_held_out():
+def test_page_without_held_out_data_has_no_close_up():
     made = fakes.diagnosis("named")
     made.traces.held_out[:] = False
     names = set(draw(json.loads(report_json(made.report)), made.traces))
@@ -223,12 +223,12 @@ def test_page_of_long_recording_is_small():
     assert len(html.encode()) < 3e6
 
 
-def test_clock_runs_on_when_a_recording_starts_anew():
+def test_time_axis_continues_when_a_recording_restarts():
     time = np.array([0.0, 0.1, 0.2, 0.0, 0.1, 50.0, 50.1])
     assert elapsed(time) == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
 
 
-def test_close_up_is_where_the_error_is_largest():
+def test_close_up_shows_the_largest_error():
     view = View.of(fakes.traces())
     span = view.spans[4]
     error = np.zeros(len(view.clock))
@@ -239,7 +239,7 @@ def test_close_up_is_where_the_error_is_largest():
     assert span.start <= rows.start and rows.stop <= span.stop
 
 
-def test_causes_that_look_alike_stand_side_by_side():
+def test_confusable_causes_are_drawn_side_by_side():
     cosine = np.eye(6)
     for a, b in ((0, 3), (1, 4), (2, 5)):
         cosine[a, b] = cosine[b, a] = 0.95
@@ -249,7 +249,7 @@ def test_causes_that_look_alike_stand_side_by_side():
     assert all(abs(order.index(a) - order.index(b)) == 1 for a, b in ((0, 3), (1, 4), (2, 5)))
 
 
-def test_extension_that_changes_nothing_is_not_drawn():
+def test_extension_without_effect_is_not_drawn():
     made = fakes.traces()
     made.extended = {channel: values.copy() for channel, values in made.base.items()}
     assert View.of(made).extended == {}

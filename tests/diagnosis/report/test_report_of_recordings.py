@@ -69,7 +69,7 @@ def test_real_report_is_valid_and_equals_written_file(
     assert SingleMuscle.from_yaml(tmp_path / "plant.yaml").digest() == found.plant.digest()
 
 
-def test_report_says_what_was_held_out(diagnosed: Callable[[str], Diagnosis]) -> None:
+def test_report_states_the_held_out_data(diagnosed: Callable[[str], Diagnosis]) -> None:
     kinds, once = diagnosed("temperature"), diagnosed("slip_step")
     assert kinds.report["held_out"]["by"] == "kinds"
     assert all(kind in kinds.text for kind in kinds.report["held_out"]["kinds"])
@@ -115,7 +115,7 @@ def test_rig_can_be_traced(diagnosed: Callable[[str], Diagnosis]) -> None:
     assert len({Rig().digest, rig.digest, Rig(rezeroed=True).digest}) == 3
 
 
-def test_without_a_comparison_in_closed_loop_there_is_a_reason(
+def test_missing_closed_loop_comparison_has_a_reason(
     diagnosed: Callable[[str], Diagnosis], tmp_path: Path
 ) -> None:
     assert diagnosed("temperature").report["closed_loop_reason"] == "it was not requested"

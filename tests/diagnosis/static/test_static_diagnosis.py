@@ -48,13 +48,13 @@ def test_measured_causes_are_named_in_the_order_of_evidence(measured):
     assert measured["causes"][0]["form"] == "pressure shift"
 
 
-def test_floor_is_that_of_the_repeats(measured):
+def test_noise_floor_is_that_of_the_repeats(measured):
     floor = measured["noise_floor"]["contraction"]
     assert floor["value"] == pytest.approx(0.168, abs=0.001)
     assert floor["from"] == "repeats"
 
 
-def test_load_blind_model_is_three_floors_off(measured):
+def test_load_blind_model_errs_by_three_noise_floors(measured):
     base = _stage(measured)
     assert base["cells_mm"] == pytest.approx(0.475, abs=0.005)
     assert base["load_left_out_mm"] == pytest.approx(0.634, abs=0.01)
@@ -77,14 +77,14 @@ def test_linear_load_effects_reduce_held_out_load_error_by_30_percent(measured):
     assert both["load_left_out_mm"] <= 0.7 * before
 
 
-def test_zeroed_form_of_the_shift_is_an_equal_rival(measured):
+def test_zero_referenced_form_of_the_shift_is_an_equal_rival(measured):
     forms = {r["form"]: r for r in measured["rivals"]}
     assert not forms["pressure shift, zeroed at each load"]["excluded"]
     assert forms["smaller stroke"]["excluded"]
     assert any("0.115 bar/kg" in text for text in measured["warnings"])
 
 
-def test_shift_and_width_come_with_intervals(measured):
+def test_shift_and_width_have_confidence_intervals(measured):
     shift = _cause(measured, COMPLIANCE)["parameters"][0]
     assert shift["unit"] == "bar/kg"
     assert shift["value"] == pytest.approx(0.077, abs=0.002)
@@ -200,7 +200,7 @@ def test_copied_repeats_are_reported_and_give_no_noise_floor():
     assert any("one is a copy" in text for text in found["warnings"])
 
 
-def test_common_zero_is_named_stretch_at_rest():
+def test_common_zero_reference_is_named_stretch_at_rest():
     one = table((0.0, 2.0, 4.0), repeats=2, pressures=PRESSURES[::2])
     sunk = one.contraction_m - 1e-3 * one.load_kg + 1e-4
     found = diagnose_readings(dataclasses.replace(one, contraction_m=sunk))
@@ -278,5 +278,5 @@ def test_fit_worse_than_nested_model_is_refused():
         check_nested([parent], child)
 
 
-def test_units_lead_back_to_bar_and_kg():
+def test_units_convert_to_bar_and_kg():
     assert units(TERMS[0].number, (4.55, 6e5, 0.0151)) == pytest.approx(6.0 / 4.55)

@@ -59,7 +59,7 @@ def test_bad_actions_change_nothing(name: str, warm: int) -> None:
 
 
 @EVERY
-def test_fuzz_of_ten_thousand_bad_actions(name: str) -> None:
+def test_ten_thousand_random_bad_actions_change_nothing(name: str) -> None:
     random = np.random.default_rng(0)
     env, twin = gym.make(name).unwrapped, gym.make(name).unwrapped
     env.reset(seed=1)
@@ -150,7 +150,7 @@ def test_bad_batches_change_nothing(name: str) -> None:
         ({"plant": 7}, "plant = '7' must be a "),
     ],
 )
-def test_bad_common_arguments(name: str, arguments: dict[str, Any], said: str) -> None:
+def test_bad_common_arguments_are_refused(name: str, arguments: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         gym.make(name, **arguments)
 
@@ -172,7 +172,9 @@ def test_bad_common_arguments(name: str, arguments: dict[str, Any], said: str) -
         ({"plant": 7}, "must be a SingleMuscle"),
     ],
 )
-def test_bad_arguments_of_muscle_positioning(arguments: dict[str, Any], said: str) -> None:
+def test_bad_arguments_of_muscle_positioning_are_refused(
+    arguments: dict[str, Any], said: str
+) -> None:
     with pytest.raises(ValueError, match=said):
         gym.make("PAM/MusclePositioning-v0", **arguments)
 
@@ -225,7 +227,7 @@ MUSCLE = "schema: 1\nfamily: single_muscle\n"
         (MUSCLE + "parameters: {mass.moving_mass: 0.05}", "too fast for 4 sub-steps"),
     ],
 )
-def test_bad_plant_files(tmp_path: Path, text: str, said: str) -> None:
+def test_bad_plant_files_are_refused(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(text)
     with pytest.raises(ValueError, match=said) as error:

@@ -22,7 +22,7 @@ EVERY_CASE = pytest.mark.parametrize(("name", "variant"), CASES)
 
 
 @EVERY
-def test_gymnasium_and_sb3_checkers_accept_it(name: str) -> None:
+def test_environment_passes_gymnasium_and_sb3_checkers(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         drawn = importlib.util.find_spec("pygame") is not None
@@ -33,7 +33,7 @@ def test_gymnasium_and_sb3_checkers_accept_it(name: str) -> None:
 
 
 @EVERY_CASE
-def test_same_seed_same_bits_and_other_seed_other_bits(name: str, variant: str) -> None:
+def test_episode_bits_depend_on_the_seed_alone(name: str, variant: str) -> None:
     env = gym.make(name, **VARIANTS[name][variant])
     first, again = trajectory(env, 5), trajectory(gym.make(name, **VARIANTS[name][variant]), 5)
     assert first == again
@@ -80,7 +80,7 @@ def test_observations_are_in_their_space_and_every_signal_varies(name: str, vari
 
 
 @EVERY
-def test_steps_share_no_memory(name: str) -> None:
+def test_observations_of_steps_share_no_memory(name: str) -> None:
     env = gym.make(name)
     kept = [env.reset(seed=0)[0]]
     infos = []

@@ -41,7 +41,7 @@ def test_rows_of_a_batch_are_single_environments(name: str, variant: str, number
 
 @pytest.mark.parametrize("name", TILED)
 @pytest.mark.skipif(not COMPILED, reason="compares with the compiled kernels")
-def test_two_cores_give_the_bits_of_one(name: str) -> None:
+def test_two_cores_give_the_same_bits_as_one(name: str) -> None:
     number = 4096
     one = batch(name, number, threads=1, episode_seconds=0.2)
     two = batch(name, number, episode_seconds=0.2)

@@ -133,7 +133,7 @@ def setup(normalize: bool = True, seconds: float = 0.4) -> Setup:
     )
 
 
-def test_every_action_pushes_its_own_cart() -> None:
+def test_each_action_acts_on_its_own_cart() -> None:
     env = PlantEnv(setup(normalize=False))
     observation, info = env.reset(seed=1)
     mass, before = info["reference"], observation[:CARTS].astype(float)

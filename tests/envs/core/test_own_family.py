@@ -45,7 +45,7 @@ def family(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         del sys.modules[name]
 
 
-def test_checkers_accept_it() -> None:
+def test_users_environment_passes_the_checkers() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(gym.make(ID, render_mode="rgb_array").unwrapped)
@@ -58,7 +58,7 @@ def test_rows_of_a_batch_equal_single_environments() -> None:
     assert check_rows(batch, dict(enumerate(singles)), 30, 3) > 0
 
 
-def test_its_view_draws_it_under_its_demonstrator() -> None:
+def test_users_view_draws_the_environment_under_its_demonstrator() -> None:
     pytest.importorskip("pygame")
     env = gym.make(ID, render_mode="rgb_array")
     observation, _ = env.reset(seed=1)

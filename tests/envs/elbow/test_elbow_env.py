@@ -225,7 +225,7 @@ def rewards(policy: Any, seed: int) -> tuple[np.ndarray, dict[str, Any]]:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_ending_an_episode_at_a_stop_never_pays(seed: int) -> None:
+def test_ending_an_episode_at_a_stop_has_the_lowest_return(seed: int) -> None:
     crash, info = rewards([-1.0, 1.0], seed)
     assert info["terminated"]
     assert len(crash) < 100
@@ -239,7 +239,7 @@ def test_ending_an_episode_at_a_stop_never_pays(seed: int) -> None:
     assert per_period > -2.0 * min(held.min(), crash[:-1].min())  # no period costs as much
 
 
-def test_no_period_costs_as_much_as_a_remaining_one() -> None:
+def test_reward_of_a_period_exceeds_the_penalty_per_remaining_period() -> None:
     torque, stiffness = largest_errors(PLANT)
     env = made(randomize=True, motion="sines", span=(0.1, 2.0), pace=1.0, start="random")
     worst = TorqueStiffness().worst(torque, stiffness)

@@ -212,6 +212,6 @@ def test_command_gives_the_set_points_of_pressure() -> None:
         ),
     ],
 )
-def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:
+def test_bad_arguments_are_refused(arguments: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         gym.make(NAME, **arguments)

@@ -191,6 +191,6 @@ def test_pace_sets_the_stride_time(name: str) -> None:
         ({"reference": [1e3]}, "reference reaches 1000 N m; at most 100 N m is accepted"),
     ],
 )
-def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:
+def test_bad_arguments_are_refused(arguments: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         gym.make("PAM/KneeWalk-v0", **arguments)

@@ -205,7 +205,7 @@ SHORT = (0.0308, 0.0362)
         ({"randomize": {"lever.r_u": SHORT, "lever.r_o": SHORT}}, "loses its lever arm"),
     ],
 )
-def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:
+def test_bad_arguments_are_refused(arguments: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         gym.make(NAME, **arguments)
 

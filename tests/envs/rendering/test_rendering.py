@@ -61,7 +61,7 @@ def test_human_mode_opens_a_window(name: str, monkeypatch: pytest.MonkeyPatch) -
 
 
 @EVERY
-def test_close_button_closes_the_window_for_good(
+def test_window_stays_closed_after_its_close_button(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import pygame
@@ -112,7 +112,7 @@ def test_rendering_warns_without_a_mode_and_raises_before_reset(name: str) -> No
 
 
 @EVERY
-def test_copy_and_closed_environment_draw_the_present(name: str) -> None:
+def test_copy_and_closed_environment_draw_the_current_state(name: str) -> None:
     env = gym.make(name, render_mode="rgb_array").unwrapped
     env.reset(seed=0)
     for action in actions_for(env.action_space, 80):
