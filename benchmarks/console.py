@@ -1,4 +1,4 @@
-"""Output of the command line on runs and on rows that were verified."""
+"""Console output of runs and of verified rows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from benchmarks.runs.verify import Verdict
 from benchmarks.scoring.metrics import shown
 
 LINES = 40
-"""Fields of a row that are listed at most."""
+"""Largest number of listed fields of a row."""
 HOLDS, NEARLY, DRIFTED = "reproduced", "reproduced within tolerance", "DRIFTED"
 
 
@@ -33,7 +33,7 @@ def run(report: Report) -> int:
 
 
 def _score(path: Path) -> str:
-    """Return the headline of a row in words, and its audit's where there is one."""
+    """Return the headline of a row in words, and that of its audit if there is one."""
     row = rows.load(path)
     unit, factor = shown(views.content_of(row))
 
@@ -67,7 +67,7 @@ def counted(found: Sequence[Verdict]) -> str:
 
 
 def verdict(found: Verdict) -> None:
-    """Print whether a row was reproduced, what has drifted, and what to do about it."""
+    """Print whether a row was reproduced, the drifted fields, and the remedy."""
     print(f"{found.row}: {outcome(found)}", flush=True)
     for line in found.drifted[:LINES]:
         print(f"  {line}")

@@ -18,7 +18,7 @@ from benchmarks.scoring.statistics import Array, Interval
 LISTED_SEEDS = 5
 """Training seeds that a learned row needs to be ranked."""
 VERIFIED = "verified"
-"""Key under which :func:`benchmarks.board.leaderboard.load` puts a row's verification."""
+"""Key of a row's verification, set by :func:`benchmarks.board.leaderboard.load`."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def unit_of(row: Mapping[str, Any]) -> tuple[str, float]:
 
 
 def is_classical(row: Mapping[str, Any]) -> bool:
-    """Return whether nothing of the row's controller is learned."""
+    """Return whether the row's controller has no learned part."""
     return bool(row["controller"]["kind"] == "classical")
 
 
@@ -115,14 +115,14 @@ def middle(row: Mapping[str, Any]) -> Interval:
 
 
 def by_training_seed(row: Mapping[str, Any], split: str = "") -> dict[int, float]:
-    """Return the headline's mean of each training seed, nothing for a classical controller."""
+    """Return the headline's mean of each training seed; empty for a classical controller."""
     found = scores(row, split=split)
     means = found.table.mean(axis=1).tolist()
     return {run: mean for run, mean in zip(found.runs, means, strict=True) if run is not None}
 
 
 def gap(row: Mapping[str, Any]) -> Interval | None:
-    """Return the headline's audit mean less its public mean, ``None`` where there is no audit."""
+    """Return the headline's audit mean less its public mean, ``None`` without an audit."""
     if not is_audited(row):
         return None
     audit, public = scores(row, split=AUDIT), scores(row, split=PUBLIC)
@@ -155,7 +155,7 @@ JUMPING = ("steps", "staircase")
 
 
 def smooth(row: Mapping[str, Any]) -> Interval | None:
-    """Return the headline over smooth references, ``None`` where none or all of them are."""
+    """Return the headline over smooth references, ``None`` if none or all references are smooth."""
     made = ScenarioSet(content_of(row)).scenarios()
     kept = {s.name for s in made if str(s.kwargs.get("reference", "")) not in JUMPING}
     if len(kept) in (0, len(made)):
@@ -187,7 +187,7 @@ def pairs_of(row: Mapping[str, Any], split: str) -> frozenset[tuple[str, int]]:
 def common_split(first: Row, second: Row) -> str | None:
     """Return the split on which two rows are compared, ``None`` if their episodes differ.
 
-    The audit's if both are in the round, the public ones otherwise.
+    It is the audit if both are in the round, otherwise the public episodes.
     """
     split = AUDIT if is_audited(first) and is_audited(second) else PUBLIC
     same = first["task"] == second["task"] and pairs_of(first, split) == pairs_of(second, split)

@@ -1,4 +1,4 @@
-"""BibTeX of a row: the row itself, this package, and the methods that the controller is made of."""
+"""BibTeX of a row: the row itself, this package, and the methods of the controller."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def bibtex(row: Mapping[str, Any]) -> str:
 def methods(citation: str) -> list[str]:
     """Return the keys of the methods in a citation of keys or titles, in its order.
 
-    A part that names no entry of ``references.bib`` is a ValueError.
+    A part without an entry in ``references.bib`` raises a ValueError.
     """
     keys = []
     for part in filter(None, citation.split(SEPARATOR)):

@@ -23,12 +23,12 @@ BETTER, DEARER, NOT_SHOWN = "better", "better error, higher cost", "not shown to
 
 @dataclass(frozen=True)
 class Claim:
-    """A controller beside the best paper controller of its track.
+    """Comparison of a controller with the best paper controller of its track.
 
-    ``probability`` is that of improvement of the headline over training seeds and paired episodes,
-    ``gain`` the relative reduction of the mean, paired by episode. ``ratios`` are those of costs,
-    infinite where the paper controller has none. ``reasons`` are the violated conditions of
-    ``BETTER``, ``remarks`` the numbers of settings that were tried for each side.
+    ``probability`` is the probability of improvement of the headline over training seeds and paired
+    episodes; ``gain`` is the relative reduction of the mean, paired by episode; ``ratios`` are cost
+    ratios, infinite if the paper controller has no such cost; ``reasons`` are the violated
+    conditions of ``BETTER``; ``remarks`` are the numbers of settings tried for each side.
     """
 
     row: Row
@@ -48,10 +48,10 @@ def is_paper(row: Row) -> bool:
 
 
 def best_paper(rows: Sequence[Row]) -> Row | None:
-    """Return the best paper controller of a track, ``None`` where there is none.
+    """Return the best paper controller of a track, ``None`` if there is none.
 
-    That of the audit round with the lowest mean over its episodes; where none is in the round, the
-    one with the lowest mean over the public episodes.
+    It has the lowest mean over the episodes of the audit round; if no paper controller is in the
+    round, the lowest mean over the public episodes.
     """
     return next((row for row in standings.ordered(rows) if is_paper(row)), None)
 

@@ -160,7 +160,7 @@ def _bold_score(row: Row) -> str:
 def _gap_words(row: Row) -> str:
     """Return the gap, bold if significant, and the number of the artefact if not the first.
 
-    A changed artefact is audited anew, so that a high number shows that earlier gaps were seen.
+    A changed artefact is audited again, so that a high number means that earlier gaps were known.
     """
     words = signed(views.gap(row), views.unit_of(row)[1])
     marked = f"**{words}**" if views.is_worse_unseen(row) else words
@@ -185,7 +185,7 @@ def _origins(rows: Sequence[Row]) -> Table:
 
 
 def _means(columns: Sequence[Column]) -> Cells:
-    """Return columns of means over the published episodes."""
+    """Return columns with means over the published episodes."""
 
     def mean(metric: str, factor: float, row: Row) -> str:
         return number(factor * views.mean_of(row, metric))

@@ -1,4 +1,4 @@
-"""Numbers and tables as the board prints them."""
+"""Formatting of the board's numbers and tables."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from benchmarks.scoring.statistics import Interval
 Table = tuple[list[str], list[list[str]]]
 """Heading and lines."""
 WIDTH = 150
-"""Characters of a table's line at most; a wider table is split."""
+"""Largest number of characters of a table's line; a wider table is split."""
 LEFT = {
     *("controller", "environment", "track", "knows", "verdict", "kind", "state", "episodes"),
     *("best paper controller", "best learned", "first here", "tuning", "hardware"),

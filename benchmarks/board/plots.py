@@ -21,7 +21,7 @@ _FIXED: dict[str, Any] = {
     "font.size": 8.0,
 }
 POINTS = 60
-"""Errors at which a performance profile is drawn."""
+"""Number of errors at which a performance profile is evaluated."""
 MARKS = {"classical": "o", "residual": "D", "learned": "s"}
 DRAWN = 8
 """Number of classical controllers that are drawn, the best of a track, with all learned ones."""
@@ -30,8 +30,8 @@ DRAWN = 8
 def track_figure(ordered: Sequence[Row]) -> str:
     """Return an SVG of a track, its rows best first: error against effort, performance profiles.
 
-    Of the rows that are compared with each other, on their common episodes. Equal rows give equal
-    bytes.
+    It shows the rows that are compared with each other, on their common episodes. Equal rows give
+    equal bytes.
     """
     import matplotlib
     from matplotlib.figure import Figure

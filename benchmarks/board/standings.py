@@ -105,10 +105,10 @@ def listing(rows: Sequence[Row]) -> Listing:
 
 
 def difference(first: Row, second: Row) -> Interval | None:
-    """Return the headline of ``first`` less that of ``second``, paired by episode.
+    """Return the difference of the headlines of ``first`` and ``second``, paired by episode.
 
-    Over the audit episodes where both have them, else over the public ones; ``None`` if they have
-    not run the same.
+    The episodes are the audit's if both rows have them, otherwise the public ones; ``None`` if the
+    rows have not run the same episodes.
     """
     return _compared(statistics.difference_of_tables, first, second)
 
@@ -129,8 +129,8 @@ def _compared(compare: Callable[..., Interval], first: Row, second: Row) -> Inte
 def ranks(best_first: Sequence[Row]) -> list[Place]:
     """Return the place of each row of a track.
 
-    A row shares the place of the first of its group where the interval of their paired difference
-    holds zero.
+    A row shares the place of the first of its group if the interval of their paired difference
+    contains zero.
     """
     groups: list[list[Row]] = []
     for row in best_first:

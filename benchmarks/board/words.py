@@ -1,4 +1,4 @@
-"""Sentences and cells of the board that its pages and the site share."""
+"""Common sentences and table cells of the board's pages and the site."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Cells = dict[str, Callable[[Row], str]]
 
 
 def by_controller(rows: Sequence[Row], columns: Cells) -> Table:
-    """Return a table with a line for each row, the controller's name first."""
+    """Return a table with a line for each row, beginning with the controller's name."""
     lines = [[f"`{views.name_of(row)}`", *(cell(row) for cell in columns.values())] for row in rows]
     return ["controller", *columns], lines
 
@@ -102,7 +102,7 @@ def change_cells(found: Changes, k: int) -> list[str]:
 
 
 def short_name(track: str, tracks: Sequence[str]) -> str:
-    """Return a track's name without the first words that all tracks of its environment share."""
+    """Return a track's name without the prefix common to all tracks of its environment."""
     words = [name.split("_") for name in tracks]
     common = 0
     while all(len(w) > common + 1 and w[common] == words[0][common] for w in words):

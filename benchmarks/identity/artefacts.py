@@ -1,4 +1,4 @@
-"""Identity of a controller: policy files, knobs, and answers to the observations of a task."""
+"""Identity of a controller: policy files, knobs, and actions for the observations of a task."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Artefact:
     """Behaviour of a controller in a track.
 
     ``files`` has name, sha256, bytes and training_seed of each policy file. ``answers``, each of
-    shape (n, n_actions), are those of the controller in each setting of the task, in action ranges;
-    of a residual policy those of the controller that it corrects, and none of a policy alone.
+    shape (n, n_actions), are the controller's actions in each setting of the task, in action
+    ranges: for a residual policy those of the controller that it corrects, for a policy alone none.
     """
 
     files: tuple[Mapping[str, Any], ...]
@@ -39,7 +39,7 @@ class Artefact:
         return {"digest": digest(parts), **parts}
 
     def changes(self, record: Mapping[str, Any]) -> list[str]:
-        """Return a sentence for everything in which a recorded identity is another controller."""
+        """Return a sentence for every difference from a recorded identity."""
         own = self.record()
         if record["digest"] == own["digest"]:
             return []
@@ -74,7 +74,7 @@ def file_record(path: Path, training_seed: int) -> dict[str, Any]:
 
 
 def of(entrant: Entrant, track: ScenarioSet) -> Artefact:
-    """Return the artefact of a controller in a track, without running an episode of it."""
+    """Return the artefact of a controller in a track, without running one of its episodes."""
     files = tuple(file_record(path, seed) for seed, path in entrant.files)
     hashes = tuple(file["sha256"] for file in files)
     return Artefact(files, dict(entrant.knobs), _answers(entrant, track, hashes))
@@ -84,7 +84,7 @@ def of(entrant: Entrant, track: ScenarioSet) -> Artefact:
 def _answers(
     entrant: Entrant, track: ScenarioSet, hashes: tuple[str, ...]
 ) -> tuple[behaviour.Array, ...]:
-    """Return the answers in each setting, computed once for the same policy files."""
+    """Return the actions in each setting, computed once for the same policy files."""
     if entrant.kind == "learned":
         return ()
     found = []

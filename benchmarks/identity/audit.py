@@ -1,13 +1,13 @@
-"""Audit rounds: seeds drawn once for all controllers of a track, after they were frozen.
+"""Audit rounds: seeds drawn once for all controllers of a track, after these are frozen.
 
-Controllers are compared on episodes whose seeds were unknown before: the first eight bytes, less
-their last eleven bits so that every reader of JSON holds the number exactly, of
+Controllers are compared on episodes whose seeds were unknown before. A seed is the first eight
+bytes (less their last eleven bits, so that every JSON reader represents the number exactly) of
 
     sha256(frozen | salt | scenario | number)
 
 where *frozen* is the digest of the task and of all artefacts of the track, and the salt is drawn
 after them. Rounds are only added to ``rounds.json``; a controller or task that changed since the
-last round reports itself until the next one.
+last round is self-reported until the next one.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from benchmarks.scenarios.scenario import ScenarioSet
 
 FILE = Path(__file__).resolve().parents[1] / "rounds.json"
 EPISODES = 30
-"""Audit episodes of a row, at least."""
+"""Smallest number of audit episodes of a row."""
 PER_SCENARIO = 2
-"""Audit episodes of each scenario, at least: an interval needs the scatter within one."""
+"""Smallest number of audit episodes per scenario: an interval needs the scatter within one."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class Audit:
 
 
 def rounds() -> list[Round]:
-    """Return the rounds in the order of their drawing; none where there is no file."""
+    """Return the rounds in the order of their drawing; none without a file."""
     if not FILE.exists():
         return []
     try:
@@ -126,14 +126,14 @@ def _parsed(text: str) -> tuple[Round, ...]:
 
 
 def last(track: str) -> Round | None:
-    """Return the last round of a track, ``None`` where there was none."""
+    """Return the last round of a track, ``None`` if there is none."""
     return next((entry for entry in rounds()[::-1] if entry.track == track), None)
 
 
 def find(entrant: Entrant, track: ScenarioSet) -> Audit | None:
     """Return the audit of a controller, ``None`` unless it and the task are those of the round."""
     found = last(track.name)
-    if found is None or entrant.name not in found.entrants:  # saves building controllers
+    if found is None or entrant.name not in found.entrants:  # avoids building controllers
         return None
     if found.changes(entrant, track):
         return None
@@ -155,7 +155,7 @@ def in_last_round(row: Mapping[str, Any]) -> bool:
 
 
 def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
-    """Draw a round of a track and add it to the file; the last one stays if nothing has changed."""
+    """Draw a round of a track and add it to the file; keep the last one if nothing has changed."""
     with FileLock(FILE.with_name(f".{FILE.name}.lock")):
         for entrant in entrants:
             trainings.check_files(entrant)

@@ -1,8 +1,8 @@
-"""Behaviour under fixed inputs: trajectories of environments and answers of controllers.
+"""Behaviour under fixed inputs: trajectories of environments and actions of controllers.
 
-The actions are made of integers and the environments' steps are bit-exact on every processor, so
-that the hash of a trajectory is portable. Controllers may be designed by iterations that round
-differently; their answers are compared within a tolerance.
+The fixed actions are computed from integers and the environments' steps are bit-exact on every
+processor, so that the hash of a trajectory is portable. The design of a controller may use
+iterations that round differently; its actions are compared within a tolerance.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ SHARE = 0.6
 """Largest action in half ranges: no scenario of the board ends early under it."""
 LEVELS = 5
 PERIODS = 12
-"""Observations at the start of each part of a trajectory that controllers answer."""
+"""Number of observations, from the start of each part of a trajectory, given to controllers."""
 SCALES = (1.0, 0.25, 1.0, 0.25)
 """Parts of a trajectory, and the factor of their distance from its first observation.
 
-Under small errors fewer answers are at an end of the range, where they would say nothing.
+With small errors fewer actions are saturated, where they would carry no information.
 """
 TOLERANCE = 1e-6
-"""Difference of two answers, in action ranges, that is rounding."""
+"""Largest difference of two actions, in action ranges, that counts as rounding."""
 DIGITS = 10
-"""Significant digits of a score: sums of numpy may differ beyond."""
+"""Significant digits of a score; sums of numpy may differ beyond them."""
 
 Array = NDArray[np.float32]
 Sequences = tuple[Array, ...]
 
 
 class FixedActions:
-    """Controller of levels that are held for a quarter of a second, whatever it observes."""
+    """Controller of levels held for a quarter of a second, independent of the observation."""
 
     def __init__(self, space: Any) -> None:
         self.middle = (space.high + space.low) / 2
@@ -57,7 +57,7 @@ class FixedActions:
         return action.astype(np.float32), period + 1
 
     def model_output(self, state: int) -> Array:
-        """Return levels in place of a model's output, which some metrics compare with."""
+        """Return the levels as the model output that some metrics require."""
         return self._levels(state // HOLD)
 
     def _levels(self, number: int) -> Any:
@@ -71,7 +71,7 @@ class Behaviour:
     """Behaviour of a scenario under fixed actions.
 
     ``trajectory`` is the hash of observations and physical signals, without reward terms;
-    ``scores`` are the metrics of that episode, and of the same one if it had failed, to ten
+    ``scores`` are the metrics of that episode, and of the same episode as a failed one, to ten
     digits; ``observations`` are consecutive ones from the start of each part.
     """
 
@@ -93,7 +93,7 @@ def of_environment(env: Any, content: Mapping[str, Any], rests: bool) -> Behavio
 
 
 def _sequences(observations: Any) -> Sequences:
-    """Return the observations that controllers answer, by operations that round equally."""
+    """Return the observations for controllers, computed by operations that round equally."""
     parts = np.array_split(observations.astype(np.float32), len(SCALES))
     first = parts[0][:1]
     scaled = zip(SCALES, parts, strict=True)
@@ -101,9 +101,9 @@ def _sequences(observations: Any) -> Sequences:
 
 
 def of_controller(controller: Any, observations: Sequences, space: Any) -> Array:
-    """Return answers as shares of the action range, (n, n_actions), from a new start in each part.
+    """Return actions in action ranges, (n, n_actions), with an episode start in each part.
 
-    There are fewer rows where the controller raised an error.
+    There are fewer rows if the controller raises an error.
     """
     span = space.high - space.low
     found = []
@@ -117,19 +117,19 @@ def of_controller(controller: Any, observations: Sequences, space: Any) -> Array
 
 
 def difference(first: Array, second: Array) -> float:
-    """Return the largest difference of answers in action ranges; infinite for other shapes."""
+    """Return the largest difference of actions in action ranges; infinite for different shapes."""
     if first.shape != second.shape or not np.array_equal(np.isnan(first), np.isnan(second)):
         return float("inf")
     return float(np.nanmax(np.abs(first - second), initial=0.0))
 
 
 def pack(given: Array) -> dict[str, Any]:
-    """Return answers in JSON's types, to the last bit."""
+    """Return actions in JSON's types, to the last bit."""
     data = zlib.compress(given.astype("<f4").tobytes(), 9)
     return {"shape": list(given.shape), "data": base64.b85encode(data).decode()}
 
 
 def unpack(packed: Mapping[str, Any]) -> Array:
-    """Return the answers that :func:`pack` wrote."""
+    """Return the actions written by :func:`pack`."""
     data = zlib.decompress(base64.b85decode(packed["data"]))
     return np.frombuffer(data, "<f4").reshape(packed["shape"])

@@ -19,7 +19,7 @@ from benchmarks.scenarios.scenario_env import make_env, model_of
 class Setting:
     """Nominal plant and named signals from which the controllers of a track are built.
 
-    Their answers to ``observations``, each of shape (n, n_signals), identify them.
+    Their actions for ``observations``, each of shape (n, n_signals), identify them.
     """
 
     model: Any
@@ -95,13 +95,13 @@ def of(track: ScenarioSet) -> Task:
 
 
 def _spread(found: Sequence[behaviour.Sequences]) -> behaviour.Sequences:
-    """Return one episode's observations, each part from another scenario as far as there are."""
+    """Return one episode's observations, each part from a different scenario if possible."""
     parts = len(found[0])
     return tuple(found[k * len(found) // parts][k] for k in range(parts))
 
 
 def check_version(env: str, row: str) -> None:
-    """Raise unless this checkout has the version of an environment that a row is of."""
+    """Raise unless this checkout has the environment version of a row."""
     import pam_envs  # noqa: F401  registers the ids
 
     space, name, _ = gym.envs.registration.parse_env_id(env)

@@ -1,7 +1,7 @@
 """Trainings of a learned row: the first n seeds of one training, none copied or left out.
 
-Several seeds show the scatter of a training. A copied policy, a seed that is dropped because of its
-score, or a lucky one of other settings would make it look smaller.
+Several seeds show the scatter of a training. A copied policy, a seed dropped because of its score,
+or a lucky seed of other settings would hide part of that scatter.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LEFT_OUT = ("search", "checkpoint_steps")
 
 
 def of(entrant: Entrant) -> list[dict[str, Any]] | None:
-    """Return the training of each policy file from the record beside it, ``None`` without any."""
+    """Return the training of each policy file from the record beside it, ``None`` without one."""
     if not entrant.files:
         return None
     found = []
@@ -46,13 +46,13 @@ def card_record(controller: Any) -> dict[str, Any]:
     config = dict(said.get("config") or {})
     settings = {name: said.get(name) for name in SETTINGS}
     settings["config"] = {name: v for name, v in config.items() if name not in LEFT_OUT}
-    corrected = dict(said.get("baseline") or {})  # recorded answers differ by rounding
+    corrected = dict(said.get("baseline") or {})  # recorded actions differ by rounding
     settings["baseline"] = [corrected.get(name) for name in ("name", "scale")]
     return {"seed": said.get("seed"), "settings": digest(settings)[:16]}
 
 
 def check_files(entrant: Entrant) -> None:
-    """Raise ValueError unless the files are of seeds 0, 1, 2, ... and all different."""
+    """Raise ValueError unless the files belong to seeds 0, 1, 2, ... and all differ."""
     seeds = [seed for seed, _ in entrant.files]
     if seeds != list(range(len(seeds))):
         raise ValueError(
@@ -70,7 +70,7 @@ def check_files(entrant: Entrant) -> None:
 
 
 def check_cells(entrant: Entrant, cells: Sequence[Mapping[str, Any]]) -> None:
-    """Raise ValueError unless a row's cells are of different seeds of one training."""
+    """Raise ValueError unless a row's cells belong to different seeds of one training."""
     check_files(entrant)
     if not entrant.files:
         return

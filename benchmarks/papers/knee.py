@@ -195,7 +195,7 @@ def stiffness_figures(
 
 
 def tension_feedback() -> Iterator[Figure]:
-    """Tension tracking by the printed controller, alone and with a feed-forward."""
+    """Tension tracking by the printed controller, alone and with a feedforward."""
     figure = partial(Figure, source=f"{SOURCE}, section 5.1")
     alone, most = PRINTED["LTR"], PRINTED["LTR + inverse"]
     for width in LOOP_WIDTHS:

@@ -26,7 +26,7 @@ from benchmarks.scoring.metrics import scores_of
 SCHEMA = 3
 PUBLIC, AUDIT = "public", "audit"
 PROBED_STEPS = 250
-"""Steps of the episode on which the use of the preview is measured."""
+"""Number of steps of the episode that measures the use of the preview."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Cell:
 
     @property
     def key(self) -> str:
-        """Digest of everything that the result depends on: the name of its record."""
+        """Digest of all inputs of the result; it is the name of the record."""
         grid = ("grid", "per_reference", "title", "seeds")
         return digest(
             {
@@ -67,7 +67,7 @@ class Cell:
 
     @property
     def drawn(self) -> bool:
-        """True if a picture is kept: of the first training seed, on public episodes."""
+        """True if a picture is kept, that is for the first training seed on public episodes."""
         first = self.split == PUBLIC and self.training_seed == self.entrant.training_seeds[0]
         return first and self.scenario.name in traces.chosen(self.track)
 
@@ -97,18 +97,18 @@ def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -
 
 @dataclass(frozen=True)
 class Group:
-    """Cells, one or more, that differ in their seeds alone."""
+    """One or more cells that differ only in their seeds."""
 
     cells: tuple[Cell, ...]
 
     @property
     def key(self) -> str:
-        """Digest of everything that the records depend on: no cell is in two groups."""
+        """Digest of all inputs of the records; no cell is in two groups."""
         return self.cells[0].key
 
 
 def grouped(cells: Iterable[Cell]) -> list[Group]:
-    """Return cells in groups, in the order of their first ones."""
+    """Return cells in groups, ordered by their first cells."""
     found: dict[Any, list[Cell]] = defaultdict(list)
     for cell in cells:
         found[cell.entrant, cell.track, cell.scenario.name, cell.training_seed].append(cell)

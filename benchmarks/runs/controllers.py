@@ -1,4 +1,4 @@
-"""Controllers of the catalogues of ``baselines`` and, where installed, of ``agents``."""
+"""Controllers of the catalogues of ``baselines`` and, if installed, of ``agents``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BY_RULE = "by rule or as published"
 
 @dataclass(frozen=True)
 class Entrant:
-    """A controller as the board names it.
+    """A controller of the board.
 
     ``knowledge`` is "nothing", "tables", "nominal model" or "true model"; ``kind`` "classical",
     "learned" or "residual", which is learned on top of a classical one. ``source`` is the module
@@ -53,11 +53,11 @@ class Entrant:
 
     @property
     def training_seeds(self) -> tuple[int | None, ...]:
-        """Training seeds, or ``None`` alone for a controller that is not trained."""
+        """Training seeds, or only ``None`` for a controller that is not trained."""
         return tuple(seed for seed, _ in self.files) or (None,)
 
     def runs_in(self, env: str) -> bool:
-        """Return whether the controller is meant for an environment."""
+        """Return whether the controller is for an environment."""
         return not self.envs or env in self.envs
 
 
@@ -91,7 +91,7 @@ def _entrant(name: str, entry: Any, module: str) -> Entrant | None:
 
 
 def _movable(path: Path) -> Path:
-    """Return a path relative to the checkout where it is inside, so that the checkout may move."""
+    """Return a path relative to the checkout if it is inside, so that the checkout may move."""
     whole = Path(path).resolve()
     return whole.relative_to(ROOT) if whole.is_relative_to(ROOT) else whole
 

@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks.runs.controllers import Entrant
 
 IGNORANT = ("nothing", "tables")
-"""Labels of controllers that do not depend on the model; a test builds them from another one."""
+"""Labels of controllers independent of the model; a test builds them from a different model."""
 NOMINAL, TRUE = "nominal model", "true model"
 TRAINED = "nominal model, trained on the plant"
 """Label of a policy that was trained on the simulated plant; others know a nominal model."""

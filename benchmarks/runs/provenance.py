@@ -1,4 +1,4 @@
-"""Notes on how a result was made: packages, commit, processor, place and time."""
+"""Provenance of a result: packages, commit, processor, place and time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CODE = (
     *(f":(exclude)benchmarks/{name}" for name in ("results", "leaderboard", "site", "rounds.json")),
     ":(exclude)benchmarks/LEADERBOARD.md",
 )
-"""Paths that make results, without those that a run writes."""
+"""Paths that affect results, without those written by a run."""
 PACKAGES = ("numpy", "scipy", "numba", "gymnasium", "onnxruntime")
 RUNNING = ("identity", "runs", "scenarios", "scoring")
 """Folders of this package that compute scores."""
@@ -36,7 +36,7 @@ def sources() -> str:
     """Return a digest of all code and data that compute scores.
 
     It names the cells of this machine's checkpoint, never a result: a cell is computed again after
-    any change of code, also one that fixed inputs would not show.
+    any change of code, even one that the fixed inputs do not reveal.
     """
     folders = [ROOT / "pam_envs", ROOT / "baselines", *(HERE / name for name in RUNNING)]
     return digest([sources_digest(folders), sources_digest([ROOT / "agents"], SOURCES & {".py"})])
@@ -44,7 +44,7 @@ def sources() -> str:
 
 @lru_cache(maxsize=1)
 def cpu() -> str:
-    """Return the kind of processor that numerical libraries choose their code by."""
+    """Return the type of processor, by which numerical libraries select their code."""
     import llvmlite.binding
 
     return str(llvmlite.binding.get_host_cpu_name())

@@ -16,10 +16,10 @@ from benchmarks.runs.controllers import ROOT, Controller
 from sweeps.worker import is_needed
 
 LONGEST = 300
-"""Characters of a message that a row keeps."""
+"""Largest number of characters of a message in a row."""
 
 REPLAYED = 100
-"""Steps of an episode that a controller is asked for again, alone, after it ran in a batch."""
+"""Steps of an episode that are repeated with a single row after a run in a batch."""
 
 Array = NDArray[np.float64]
 Watch = Callable[[Any], None]
@@ -30,9 +30,9 @@ class Episode:
     """Record of one episode of n steps.
 
     ``signals`` are every entry of ``info``, SI, and the outputs of the model that the controller
-    follows, if it has one: ``model/0``, ``model/1``, ... ``seconds`` are times that answers to one
-    observation took, not of all steps where episodes ran as rows of a batch. ``failure`` is the
-    reason of an early end, or the message of the controller's error; empty otherwise.
+    follows, if it has one: ``model/0``, ``model/1``, ... ``seconds`` are computation times of
+    single actions, not of all steps if episodes ran as rows of a batch. ``failure`` is the reason
+    of an early end, or the message of the controller's error; empty otherwise.
     """
 
     signals: Mapping[str, Array]
@@ -49,11 +49,11 @@ class Episode:
 
 
 def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None) -> Episode:
-    """Run one episode and record it; nothing is wrapped, filtered or scaled on the way.
+    """Run one episode and record it, without any wrapping, filtering or scaling.
 
     ``watch`` is called with the environment after the reset and after each step (for a video). An
-    error of the controller ends the episode as failed; an error that the environment raises of an
-    action that it has to take is an error of ours, and raised.
+    error of the controller ends the episode as failed; an error that the environment raises for a
+    valid action is a defect of this package, and is raised.
     """
     observation, first = env.reset(seed=seed)
     keys = tuple(first)
@@ -113,7 +113,7 @@ def _named(keys: Sequence[str], table: Array, models: Array) -> dict[str, Array]
 def run_all(
     make: Callable[[int], Any], env: Any, controller: Controller, seeds: Sequence[int]
 ) -> list[Episode]:
-    """Run an episode for each seed, as rows of a batch where that gives the same bits.
+    """Run an episode for each seed, as rows of a batch if that gives the same bits.
 
     A row of a batch is the single environment to the last bit, and a row of a controller should be.
     This is checked: the first answers in the first and the last row are computed again, alone.
@@ -144,7 +144,7 @@ def _check_needed() -> None:
 
 
 class _NotAsRows(Exception):
-    """The controller takes no batch, or its rows differ from single episodes."""
+    """The controller does not accept batches, or its rows differ from single episodes."""
 
 
 @contextmanager
@@ -189,7 +189,7 @@ def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[
         after, _, terminated, truncated, report = batch.step(action)
         start = terminated | truncated
         table = np.array([report[key] for key in keys])
-        if start.any():  # of a row that has ended, the last of that episode
+        if start.any():  # for a row that has ended, the last observation of that episode
             table[:, start] = np.array([report["final_info"][key][start] for key in keys])
         infos.append(table)
         observations.append(observation)
@@ -217,7 +217,7 @@ def _ended(seconds: float) -> str:
 
 
 def _acceptable(action: Any, env: Any) -> bool:
-    """Return whether an environment has to take an action: numbers of the right shape."""
+    """Return whether an environment must accept an action: finite numbers of the right shape."""
     try:
         given = np.asarray(action, np.float64)
     except (TypeError, ValueError):
@@ -233,11 +233,11 @@ def _sentence(error: Exception) -> str:
 
 
 def preview_used(episode: Episode, controller: Controller, signals: Any) -> float:
-    """Return the preview horizon that a controller uses [s], measured by its answers.
+    """Return the preview horizon that a controller uses [s], measured by its actions.
 
-    The observations of one of its episodes are shown to it again with the last samples replaced by
-    the present reference. The first replacement that changes an action marks the last sample in
-    use. The preview of a signal ``reference`` is ``reference_1``, ...
+    The controller gets the observations of one of its episodes again, with the last samples
+    replaced by the present reference. The first replacement that changes an action marks the last
+    sample in use. The preview of a signal ``reference`` is ``reference_1``, ...
     """
     ahead = _previewed({signal.name: signal.index for signal in signals})
     if not ahead or not len(episode.observations):
@@ -265,7 +265,7 @@ def _previewed(index: Mapping[str, int]) -> dict[int, list[tuple[int, int]]]:
 
 
 def _timed(controller: Controller, observations: NDArray[Any]) -> tuple[NDArray[Any], Array]:
-    """Return a controller's answers to an episode's observations, and their times [s]."""
+    """Return a controller's actions for an episode's observations, and their times [s]."""
     answers, seconds, state, clock = [], [], None, time.perf_counter
     for i, observation in enumerate(observations):
         begin = clock()

@@ -1,4 +1,4 @@
-"""Rows of the board: one controller over one scenario file, with everything to reproduce it."""
+"""Rows of the board: one controller over one scenario file, with all data to reproduce it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ KEYS = (
     *("env.id", "env.version", "controller.name", "controller.kind", "controller.artefact"),
     *("scenarios.name", "scenarios.version", "scenarios.digest", "scenarios.content"),
 )
-"""Entries of a row, and their entries that other modules read."""
+"""Entries of a row, and the sub-entries that other modules read."""
 _NAME = re.compile(r"[A-Za-z0-9_]+")
 
 Row = dict[str, Any]

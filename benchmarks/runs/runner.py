@@ -1,4 +1,4 @@
-"""Run the missing cells in parallel, then write the rows. The cells on disk are the checkpoint."""
+"""Parallel computation of missing cells and writing of rows; cells on disk are the checkpoint."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ def plans(pairs: Iterable[Pair]) -> list[Plan]:
 
 @dataclass
 class Report:
-    """Report of a run: cells that were computed now, and that were there already.
+    """Report of a run: cells computed now, and cells already stored.
 
-    ``swept`` counts half-written files of killed processes that were removed; ``quarantined`` names
-    corrupt cells that were computed again, ``missing`` cells and rows that could not be made.
+    ``swept`` counts removed half-written files of killed processes; ``quarantined`` names corrupt
+    cells that were computed again; ``missing`` names cells and rows that could not be computed.
     """
 
     computed: int = 0
@@ -65,7 +65,7 @@ class Computing:
     """Processes that compute."""
 
     jobs: int = os.cpu_count() or 1
-    """Processes of this machine; 1 computes in the calling one."""
+    """Processes of this machine; 1 computes in the calling process."""
     backend: Literal["loky", "dask"] = "loky"
     """Processes of this machine, or a running Dask cluster."""
     address: str = ""
@@ -82,7 +82,7 @@ class Options(Computing):
     """Options of a run."""
 
     force: bool = False
-    """Compute cells again that are there already."""
+    """Compute stored cells again."""
     out: Path = rows.RESULTS
     """Folder of the rows."""
     cells: Path = CELLS
@@ -112,7 +112,7 @@ def run(
     written = dict[int, Path]()
 
     def finish(place: int) -> None:
-        """Write a row if its cells are all there."""
+        """Write a row if all its cells are stored."""
         plan = chosen[place]
         loaded = {key: store.load(key) for key in plan.cells}
         for key in (key for key, record in loaded.items() if record is None):
@@ -149,7 +149,7 @@ def run(
 
 
 def planned(pairs: Sequence[Pair], options: Options) -> Iterator[tuple[Cell, bool]]:
-    """Return the cells of rows, and whether each is there already; nothing is changed."""
+    """Return the cells of rows, and whether each is already stored; nothing is changed."""
     store = Store(options.cells)
     for key, cell in ((k, cell) for plan in plans(pairs) for k, cell in plan.cells.items()):
         yield cell, not options.force and store.sound(key)
@@ -164,7 +164,7 @@ def title(cell: Cell) -> str:
 def _compute(
     missing: Iterable[Cell], store: Store, cluster: engine.Cluster
 ) -> Iterator[tuple[str, str | None]]:
-    """Compute cells, keep each as it comes, and yield its key and why it could not be computed."""
+    """Compute cells, store each on completion, and yield its key and, on failure, the reason."""
     groups = {group.key: group for group in cells_module.grouped(missing)}
     for done in engine.run(cells_module.compute, groups.values(), cluster):
         for cell in groups[done.key].cells:
@@ -184,7 +184,7 @@ def pairs_of(entrants: Iterable[Entrant], tracks: Iterable[ScenarioSet]) -> list
 def fits(entrant: Entrant, track: ScenarioSet) -> bool:
     """Return whether a track has the signals and actions that a policy was trained with.
 
-    Those of an environment depend on its arguments, like the valves of the elbow orthosis.
+    They depend on the arguments of the environment, like the valves of the elbow orthosis.
     """
     if entrant.trained_with is None:
         return True

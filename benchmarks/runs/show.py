@@ -1,4 +1,4 @@
-"""Run one episode and draw it. Matplotlib is imported when a figure is drawn."""
+"""Run and drawing of one episode. Matplotlib is imported when a figure is drawn."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def play(
     filmed = {"render_mode": "rgb_array"} if video else {}
     try:
         env = make_env(env_id, {**kwargs, **filmed})
-    except (TypeError, ValueError) as error:  # without Gymnasium's addition to the message
+    except (TypeError, ValueError) as error:  # remove Gymnasium's suffix of the message
         said = str(error).partition(" was raised from the environment creator")[0]
         raise ValueError(f"{env_id}: {said}") from error
     made = controllers.make(entrant, env.unwrapped.plant, env)
@@ -39,7 +39,7 @@ def play(
 
 @contextmanager
 def _film(path: Path | None, env: Any) -> Iterator[rollout.Watch | None]:
-    """Yield what adds a frame every few steps to a film in real time, if there is a path."""
+    """Yield the function that adds frames to a real-time film; None without a path."""
     if path is None:
         yield None
         return
@@ -69,7 +69,7 @@ def summary(episode: rollout.Episode, content: Mapping[str, Any]) -> dict[str, f
 
 
 def score_lines(scores: Mapping[str, float], content: Mapping[str, Any]) -> list[str]:
-    """Return a line for each score with its unit, SI; one that no number belongs to says so."""
+    """Return a line for each score with its SI unit, also for inapplicable scores."""
     units = metrics.of_track(content)
     lines = []
     for name, value in scores.items():
@@ -87,7 +87,7 @@ def episode_figure(
 ) -> Any:
     """Return a figure of an episode: tracking, error, setpoints and output over pressure.
 
-    The last is left out if the pressure of a single muscle is not recorded. ``shown`` is the unit
+    The last is omitted if the pressure of a single muscle is not recorded. ``shown`` is the unit
     of the output and its factor from SI; ``set_points`` are pressures, or angles, by name.
     """
     from matplotlib.figure import Figure

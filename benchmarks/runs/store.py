@@ -1,8 +1,8 @@
-"""Records on disk, written atomically and with a checksum over all but ``volatile``.
+"""Records on disk, written atomically, with a checksum over all entries except ``volatile``.
 
 A file is written under a temporary name, flushed to the disk and renamed, so that a killed process
 leaves the old file or the new one. A file that ends in ``.xz`` is compressed JSON and holds the
-episodes as columns: of episodes with the same keys, the list of values of each key.
+episodes as columns: one list of values per key, for episodes with the same keys.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def read_json(path: Path) -> Any:
 
 
 def columns(episodes: Any) -> Any:
-    """Return episodes as columns, or unchanged where their keys differ."""
+    """Return episodes as columns, or unchanged if their keys differ."""
     if not _alike(episodes) or not _alike([episode.get(SCORES) for episode in episodes]):
         return episodes
     found = {key: [episode[key] for episode in episodes] for key in episodes[0] if key != SCORES}
@@ -127,7 +127,7 @@ def _rows(table: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
 
 
 def fault(record: Any) -> str | None:
-    """Return the fault of a record that was read, ``None`` if it has none."""
+    """Return the defect of a record that was read, ``None`` if it has none."""
     if not isinstance(record, dict):
         return "not a JSON object"
     if CHECKSUM not in record:
@@ -166,7 +166,7 @@ class Store:
             aside, path = self.folder / "quarantine", self.path(key)
             aside.mkdir(parents=True, exist_ok=True)
             number = len(list(aside.iterdir()))
-            with suppress(FileNotFoundError):  # another run was faster
+            with suppress(FileNotFoundError):  # another process was faster
                 os.replace(path, aside / f"{path.stem}.{number}{path.suffix}")
             return None
 
@@ -194,12 +194,12 @@ class Store:
         return sorted(file.name for file in aside.iterdir()) if aside.is_dir() else []
 
     def sweep(self) -> int:
-        """Remove temporary files of processes that are gone; see :func:`sweep`."""
+        """Remove temporary files of ended processes; see :func:`sweep`."""
         return sweep(self.folder)
 
 
 def sweep(folder: Path) -> int:
-    """Remove the half-written files that processes of this machine left in ``folder``."""
+    """Remove half-written files of this machine's ended processes from ``folder``."""
     removed = 0
     for file in folder.rglob(f".*{_SUFFIX}") if folder.is_dir() else ():
         *_, host, process = file.name[: -len(_SUFFIX)].rsplit(".", 2)

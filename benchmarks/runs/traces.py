@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Signals = Mapping[str, Array]
 
 POINTS = 400
-"""Samples of a signal at most."""
+"""Largest number of samples of a signal."""
 GRID = 2_000
 """Steps of the grid over a signal's range; a picture is at most 220 pixels high."""
 
@@ -24,7 +24,7 @@ _PRESSURES: tuple[tuple[str, ...], ...] = (
     ("state/pressure_a", "state/pressure_b"),
     ("state/pressure_0a", "state/pressure_0b"),
 )
-"""Of one muscle, or of a pair (of a chain, the first pair)."""
+"""Pressure signals of one muscle, or of a pair (of a chain, the first pair)."""
 
 
 def chosen(track: ScenarioSet) -> tuple[str, ...]:

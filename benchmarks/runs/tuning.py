@@ -1,4 +1,4 @@
-"""Search the knobs of a paper's controller, the numbers that it leaves free, on tuning seeds.
+"""Search over the knobs of a paper's controller, its free parameters, on tuning seeds.
 
 Classical controllers get as many trials as learned ones, by the same sampler, on the same seeds
 (:mod:`agents.search.tune`, :mod:`agents.settings.seeds`), which no score is ever taken from. The
@@ -49,14 +49,14 @@ from sweeps.progress import Start
 TRIALS = 20
 EPISODES = 30
 STARTUP = 8
-"""Trials that are drawn evenly before the sampler learns from them."""
+"""Initial trials, drawn uniformly before the sampler uses their results."""
 MOST_RATIO = 100.0
-"""Largest ratio of a cost that counts."""
+"""Upper limit of the excess of one cost."""
 STORAGE = controllers.ROOT / "runs" / "tuning.db"
 UNTUNED = "untuned"
 SPLIT = "tuning"
 DIGITS = 4
-"""Of a factor, as a person would write it."""
+"""Significant digits of a factor."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Measured:
 
 
 class Course:
-    """The tuning episodes of a controller in a track, as many for each scenario."""
+    """The tuning episodes of a controller in a track, equally many for each scenario."""
 
     def __init__(self, controller: str, track: ScenarioSet, episodes: int = EPISODES) -> None:
         entrant = controllers.find(controller)
@@ -164,7 +164,7 @@ class Course:
 
 
 def seeds_of(track: ScenarioSet, episodes: int) -> dict[str, tuple[int, ...]]:
-    """Return the tuning seeds of each scenario: as many for each, and none twice."""
+    """Return the tuning seeds of each scenario: equally many for each, and none twice."""
     names = [scenario.name for scenario in track.scenarios()]
     each = -(-episodes // len(names))
     shared = tuning(each * len(names))
@@ -229,7 +229,7 @@ def open_study(job: Job) -> optuna.Study:
         sources_digest([controllers.ROOT / "pam_envs"], SOURCES),
     ]
     bounds = {name: list(ends) for name, ends in job.bounds.items()}
-    task = digest([nominal_track(job.env).content, bounds, code])  # without results of searches
+    task = digest([nominal_track(job.env).content, bounds, code])  # excluding results of searches
     name = f"{tuned_name(job.controller, job.env)}, {job.episodes} episodes, seed {job.seed}"
     study = optuna.create_study(
         storage=RDBStorage(url, engine_kwargs=patience),
@@ -237,7 +237,7 @@ def open_study(job: Job) -> optuna.Study:
         load_if_exists=True,
     )
     for lost in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
-        study.tell(lost.number, state=TrialState.FAIL)  # the sampler would count it
+        study.tell(lost.number, state=TrialState.FAIL)  # otherwise the sampler would count it
     return study
 
 
@@ -246,7 +246,7 @@ def _finished(study: optuna.Study) -> list[optuna.trial.FrozenTrial]:
 
 
 def _proposed(trial: Any, bounds: Bounds) -> dict[str, float]:
-    """Return the factors that a trial proposes: evenly by their logarithm, to some digits."""
+    """Return the factors that a trial proposes: log-uniform, rounded."""
     drawn = {name: trial.suggest_float(name, *ends, log=True) for name, ends in bounds.items()}
     return {name: float(f"{value:.{DIGITS}g}") for name, value in drawn.items()}
 

@@ -1,4 +1,4 @@
-"""Notes of verification beside the rows: which rows were reproduced, when and how exactly."""
+"""Verification record beside the rows: reproduced rows, date, and exactness."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Found = Mapping[str, Mapping[str, Any]]
 
 
 def read(folder: Path) -> Found:
-    """Return the verifications of a folder of rows; none where there is no such file."""
+    """Return the verifications of a folder of rows; none without the file."""
     path = folder / FILE
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
@@ -33,13 +33,13 @@ def read(folder: Path) -> Found:
 
 
 def of(row: Mapping[str, Any], found: Found) -> Mapping[str, Any] | None:
-    """Return the verification of a row, ``None`` where there is none since the row changed."""
+    """Return the verification of a row, ``None`` without one for its present content."""
     entry = found.get(row["row"])
     return entry if entry and entry["checksum"] == row.get(CHECKSUM) else None
 
 
 def note(path: Path, checksum: str, mode: str) -> None:
-    """Note that a row was reproduced, or remove its note where it was not (no ``checksum``).
+    """Record that a row was reproduced, or remove its entry if it was not (no ``checksum``).
 
     A row that was once reproduced to the last bit keeps that mode.
     """

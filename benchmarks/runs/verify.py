@@ -1,9 +1,9 @@
-"""Verification of rows: whether they are void, and whether they can be reproduced.
+"""Verification of rows: validity for the present task and controller, and reproducibility.
 
-Nothing in a row is trusted but the place where it was made: environment, scenarios, policy files,
-salt and the set of episodes are those of this checkout, and every number is computed again. A row
-that says that it was made with other packages or on another processor may differ by rounding, and
-is noted as verified elsewhere.
+Only a row's packages and processor are trusted: environment, scenarios, policy files, salt and the
+set of episodes are those of this checkout, and every number is computed again. A row that states
+other packages or another processor may differ by rounding, and is recorded as verified within
+tolerance.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ ROUNDING = 1e-4
 Between Zen 5 and Rocket Lake, in all episodes of the board, 1.4e-7 was the largest.
 """
 SLACK = 1e-6
-"""Shares of the worst case that are no difference, for scores near zero."""
+"""Share of the worst case that counts as equal, for scores near zero."""
 DRAWN = 1e-3
-"""Share of its range by which a drawn signal may differ."""
+"""Largest deviation of a drawn signal, as a share of its range."""
 ROUNDED = ("scores", "trajectory", "saturated")
 """Entries of an episode that rounding changes; a signal may just reach its bound."""
 
@@ -66,7 +66,7 @@ class Verdict:
 
 
 def void(row: Record) -> list[str]:
-    """Return why a row is no result of the present task and controller, without running it."""
+    """Return the reasons why a row is void for the present task and controller, without a run."""
     about, name = row["controller"], row["scenarios"]["name"]
     try:
         tasks.check_version(row["env"]["id"], row["row"])
@@ -136,7 +136,7 @@ def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
 def _other_audit(
     stored: Record, entrant: Entrant, track: ScenarioSet, found: Audit | None
 ) -> list[str]:
-    """Return why a row has an audit that it may not have, or lacks one."""
+    """Return the reason why a row's audit is inadmissible or missing."""
     if found is not None and stored["audit"] is None:
         return [
             f"audit: left out, though round {found.round.number} was drawn on {found.round.drawn}; "
@@ -184,7 +184,7 @@ def _compare(stored: Record, again: Record, verdict: Verdict) -> None:
 
 
 def _described(row: dict[str, Any]) -> dict[str, Any]:
-    """Take the description out of a row and return it."""
+    """Remove the description from a row and return it."""
     controller, scenario = dict(row["controller"]), dict(row["scenarios"])
     found = {key: controller.pop(key, None) for key in DESCRIPTION}
     content = dict(scenario["content"])
@@ -194,7 +194,7 @@ def _described(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def beyond_rounding(before: Record, after: Record) -> list[str]:
-    """Return a line for everything in which two rows differ by more than machines do.
+    """Return a line for every difference of two rows beyond rounding between machines.
 
     Every episode is compared, not their mean: free episodes would allow any interval.
     """
@@ -213,9 +213,9 @@ def beyond_rounding(before: Record, after: Record) -> list[str]:
 
 
 def _exact(row: Record) -> dict[str, Any]:
-    """Return the part of a row that no rounding changes.
+    """Return the part of a row that is independent of rounding.
 
-    Where no round holds a controller's answers, their digest follows from the digits of its design.
+    Without recorded actions in a round, the digest of a controller depends on rounding.
     """
     kept, about = _without(row, "episodes", "traces", "controller"), row["controller"]
     artefact = about["artefact"] if row["audit"] else _without(about["artefact"], "digest")
@@ -244,9 +244,9 @@ def _other_curves(old: list[Any], new: list[Any]) -> Iterator[str]:
 def differences(
     old: Any, new: Any, where: str = "", tolerance: float = 0.0, slack: float = 0.0
 ) -> list[str]:
-    """Return a line for every leaf in which two plain values differ, with both values.
+    """Return a line, with both values, for every leaf in which two plain values differ.
 
-    ``tolerance`` and ``slack`` are the relative and absolute difference that is none.
+    ``tolerance`` and ``slack`` are the relative and absolute differences that count as equal.
     """
     return list(_differences(old, new, where, tolerance, slack))
 

@@ -1,12 +1,12 @@
 """Scenario files: episodes of an environment and the rules of their scores.
 
 A file names an environment, a grid of keyword arguments, the number of seeds, the settling window
-and the worst-case values. What is digested is the content and not the layout, so that a comment
-changes nothing and a number changes everything.
+and the worst-case values. The digest is that of the content and not of the layout: a changed number
+changes it, a changed comment does not.
 
-Every scenario has public seeds of its own, derived from its name: one seed would give all scenarios
-of a grid the same reference and noise, and their errors would rise and fall together. A scenario
-of the same name in another track has the same seeds, so that tracks are compared in pairs.
+Every scenario has public seeds of its own, derived from its name: a common seed would give all
+scenarios of a grid the same reference and noise, and thus correlated errors. A scenario of the same
+name in another track has the same seeds, for paired comparison of tracks.
 """
 
 from __future__ import annotations
@@ -67,12 +67,12 @@ def _drawn(name: str) -> Iterator[int]:
 
 @dataclass(frozen=True)
 class ScenarioSet:
-    """The content of a scenario file as plain data, which is kept with every row."""
+    """The content of a scenario file as plain data, stored with every row."""
 
     content: Mapping[str, Any]
 
     def __post_init__(self) -> None:
-        """Check the keys and the values that the scores rest on."""
+        """Check the keys and the values that determine the scores."""
         given, asked = set(self.content), tuple(self.content.get("metrics") or ())
         unknown, missing = given - _REQUIRED - _OPTIONAL, _REQUIRED - given
         self._refuse_if(
@@ -126,10 +126,10 @@ class ScenarioSet:
         return hash(self.digest)
 
     def scenarios(self) -> tuple[Scenario, ...]:
-        """Return the grid, written out by the names of its axes.
+        """Return all scenarios of the grid, ordered by the names of its axes.
 
-        Not in the order of the file: a record keeps its content with sorted keys, and has to give
-        the same scenarios in the same order.
+        The order of the file is not used: a record stores its content with sorted keys, and must
+        give the same scenarios in the same order.
         """
         grid = dict(sorted((self.content.get("grid") or {}).items()))
         return tuple(
@@ -172,7 +172,7 @@ def load(path: Path) -> ScenarioSet:
 
 
 _ADDED: dict[str, ScenarioSet] = {}
-"""Scenario files from elsewhere, by name."""
+"""Third-party scenario files by name."""
 
 
 def add(path: Path) -> ScenarioSet:

@@ -1,7 +1,7 @@
 """Environments and nominal models of a scenario.
 
-A scenario names a registered environment and plants of this checkout and nothing else, since it may
-come from elsewhere; ``gymnasium.make`` would import the module before a colon.
+A scenario names only a registered environment and plants of this checkout, since its file may be
+third-party; ``gymnasium.make`` would import the module before a colon.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import gymnasium as gym
 from benchmarks.scenarios.scenario import Scenario
 
 PLANTS = Path(__file__).parent / "plants"
-"""Plants that scenario files name."""
+"""Folder of the plants that scenario files name."""
 _ID = re.compile(r"[A-Za-z0-9_]+/[A-Za-z0-9_]+-v[0-9]+")
 _PLANT = re.compile(r"[A-Za-z0-9_]+\.yaml")
 

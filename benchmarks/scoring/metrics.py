@@ -1,7 +1,7 @@
 """Metrics of an episode as pure functions of recorded signals, by the rules of a scenario file.
 
 All arrays have one entry per control period and are in SI. The headline compares the true output
-with the external reference; what a sensor saw is scored beside it and never instead of it.
+with the external reference; sensed values are scored in addition, never instead.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ GROUPS: dict[str, Group] = {
 """Additional groups of metrics by the names in scenario files."""
 
 COST_RATIO = 1.1
-"""Largest ratio of effort or constraint cost to the paper controller's, of a better controller."""
+"""Largest ratio of effort or constraint cost to the paper controller's for a better controller."""
 COST_FLOOR = {"constraint_cost": 1e-3}
-"""Costs that count as none: a thousandth of a scale at all times."""
+"""Costs that count as zero: a thousandth of a scale at all times."""
 COSTS = {
     **{metric: name for group in GROUPS.values() for metric, name in group.costs.items()},
     "pressure_travel": "pressure travel",
     "air_use": "air",
     "constraint_cost": "constraint cost",
 }
-"""Metrics that count as the costs of a lower error, where a track has them."""
+"""Metrics that count as the costs of a lower error, if a track has them."""
 _CONSTRAINT: Column = ("constraint_cost", "constraint cost", 1.0)
 
 
@@ -112,7 +112,7 @@ def steady_state_error(error: Array, reference: Array, hold: int) -> float:
 def constraint_cost(costs: Mapping[str, Array], scales: Mapping[str, float]) -> float:
     """Return the mean over time of all excesses over soft limits, each divided by its scale.
 
-    1 means: one scale (say 1 mm) over one soft limit, all the time.
+    A value of 1 means one scale (for example 1 mm) above one soft limit at all times.
     """
     return float(sum(np.mean(costs[name]) / scales[name] for name in scales))
 
@@ -135,7 +135,7 @@ def score(
     Raises
     ------
     ValueError
-        If nothing is left after the settling window, or of what is tracked.
+        If no samples remain after the settling window, or none of them is tracked.
     """
     time, settle = np.asarray(signals["time"]), float(content["settle_seconds"])
     window = time > settle + 0.5 * period

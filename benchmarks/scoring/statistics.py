@@ -4,13 +4,13 @@ Interquartile mean, probability of improvement and performance profile are those
 al., "Deep reinforcement learning at the edge of the statistical precipice", NeurIPS 34 (2021):
 runs are training seeds, tasks are paired episodes, and less is better.
 
-A table of scores has a row a training seed (one for a classical controller) and a column an
+A table of scores has a row per training seed (one for a classical controller) and a column per
 episode, shape (runs, n); ``strata`` are the scenarios of its columns, shape (n,).
 
-Episodes are drawn again within their scenario (stratified), with a fixed seed, so that the same
-scores give the same interval to the last bit. Training seeds are drawn as wholes, since one policy
-answers in all scenarios. Episodes of two scenarios have to be independent, so no seed may be in
-both. A group of n is resampled by n - 1 draws: with n draws an interval would be too narrow by
+Episodes are resampled within their scenario (stratified), with a fixed seed, so that the same
+scores give the same interval to the last bit. Training seeds are resampled as clusters, since one
+policy acts in all scenarios. Episodes of two scenarios must be independent, so they may not share a
+seed. A group of n is resampled by n - 1 draws: with n draws an interval would be too narrow by
 sqrt((n - 1) / n), a tenth for five seeds (rao1988, p. 231).
 """
 
@@ -46,7 +46,7 @@ class Interval:
 
 
 NOTHING = Interval(float("nan"), float("nan"), float("nan"))
-"""Estimate of a metric that applies to no episode."""
+"""Estimate of a metric that is inapplicable in every episode."""
 
 
 def mean(samples: Array) -> Array:
@@ -57,7 +57,7 @@ def mean(samples: Array) -> Array:
 def interquartile_mean(samples: Array) -> Array:
     """Return the mean of the middle half over the last axis, (..., n) to (...).
 
-    A quarter of n, rounded down, is left out at either end. A resample of s strata has n - s
+    A quarter of n, rounded down, is omitted at either end. A resample of s strata has n - s
     episodes, so that with few of them it keeps another share: of two scenarios with five episodes
     each, 4 of 8 where the estimate keeps 6 of 10.
     """
@@ -74,7 +74,7 @@ def crossed(
     Raises
     ------
     ValueError
-        If an episode of a run is missing or there twice.
+        If an episode of a run is missing or duplicated.
     """
     rows, columns = (
         {label: k for k, label in enumerate(sorted(set(labels)))} for labels in (runs, pairs)
@@ -240,7 +240,7 @@ def draw_clusters(strata: ArrayLike, resamples: int, seed: int) -> Indices:
 Draw = Callable[[list[Indices], np.random.Generator, int], Indices]
 
 
-@lru_cache(maxsize=40)  # all rows of a track ask for the same
+@lru_cache(maxsize=40)  # all rows of a track need the same resamples
 def _drawn(draw: Draw, strata: tuple[Hashable, ...], resamples: int, seed: int) -> Indices:
     members: dict[Hashable, list[int]] = {}
     for place, label in enumerate(strata):

@@ -98,22 +98,22 @@ def _mean(sizes: list[float]) -> float:
 
 
 def largest_after(signal: Array, starts: NDArray[np.int64], samples: int) -> float:
-    """Return the mean over starts of the largest size of a signal from there on, NaN of none."""
+    """Return the mean over starts of a signal's largest later magnitude, NaN without starts."""
     return _mean([np.abs(part).max() for _, part in _windows(signal, starts, samples)])
 
 
 def excess_after(signal: Array, starts: NDArray[np.int64], samples: int) -> float:
     """Return the mean over starts of the rise of a signal's size above that at the start.
 
-    The error at the start is that of the other phase's controller; the excess is the transient of
-    the one that takes over. NaN of no starts.
+    The error at the start is caused by the previous phase's controller; the excess is the transient
+    of the controller that takes over. NaN without starts.
     """
     parts = _windows(signal, starts, samples)
     return _mean([np.abs(part).max() - abs(part[0]) for _, part in parts])
 
 
 def pressure_jump(pressure: Array, starts: NDArray[np.int64], samples: int) -> float:
-    """Return the mean over starts of the largest change of pressure [Pa] from there on."""
+    """Return the mean over starts of the largest subsequent change of pressure [Pa]."""
     parts = _windows(pressure, starts, samples)
     return _mean([np.abs(part - pressure[k - 1]).max() for k, part in parts])
 
@@ -121,8 +121,8 @@ def pressure_jump(pressure: Array, starts: NDArray[np.int64], samples: int) -> f
 def of_range(record: Record) -> dict[str, float]:
     """Return the error over half the reference's range, and the share of time at the capacity.
 
-    Of a gait the half-range is a constant of its track, since its reference follows the sensed
-    angle and two controllers do not share it.
+    For a gait the half-range is a constant of its track: the reference follows the sensed angle and
+    thus differs between controllers.
     """
     reference = record.signals["reference"][record.tracked]
     error = record.signals["output"][record.tracked] - reference
@@ -159,7 +159,7 @@ def of_gait(record: Record) -> dict[str, float]:
 def emg(
     signals: Mapping[str, Array], window: Mask, period: float, activity: str
 ) -> dict[str, float]:
-    """Return the assisted over unassisted ratios of the EMG proxy, in its three readings."""
+    """Return the ratios of assisted to unassisted EMG proxy, for its three readings."""
     names = ("extensors", "extensors_free", "flexors", "flexors_free")
     plain = EmgProxy(*(signals[f"effort/{name}"][window] for name in names))
     ratios = {
@@ -193,7 +193,7 @@ def _more(proxy: EmgProxy) -> Array:
 
 
 def _ratio(helped: Array, alone: Array) -> float:
-    """Return a ratio of two RMS, NaN where there is none."""
+    """Return the ratio of two RMS values, NaN if undefined."""
     return rms(helped) / rms(alone) if rms(alone) > 0.0 else float("nan")
 
 
