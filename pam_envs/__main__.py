@@ -66,7 +66,7 @@ class Identify:
     out: Path = Path("identified")
     """Folder for the plant files and the report."""
     members: int = 8
-    """Equally good fits to look for beside the best one."""
+    """Number of equally good fits to search for beside the best one."""
 
 
 @dataclass
@@ -80,7 +80,7 @@ class Diagnose:
     out: Path = Path("diagnosis")
     """Folder for report.json, report.html and plant.yaml."""
     plant: Path | None = None
-    """Plant file to begin with; default: the shipped muscle, scaled to the rig's."""
+    """Plant file of the simulation; default: the shipped muscle, scaled to the rig."""
     causes: Path | None = None
     """Folder of further causes, one a file (docs/diagnosis_causes.md)."""
     seed: int = 0
@@ -173,7 +173,7 @@ def _arguments(name: str, options: Render) -> dict[str, Any]:
     if name == "PAM/MusclePositioning-v0":
         given |= {"reference": "staircase", "load": 2.55, "start": "rest"}
     elif options.load is not None:
-        raise Mistake(f"--load is for MusclePositioning; nothing hangs in {name}")
+        raise Mistake(f"--load is for MusclePositioning; {name} has no hanging load")
     for key in ("reference", "load"):
         if getattr(options, key) is not None:
             given[key] = getattr(options, key)

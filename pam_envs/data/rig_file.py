@@ -1,11 +1,14 @@
 """Declared facts of a rig: ``RIG.yaml``.
 
-    plant: single_muscle muscle: {rest_length_mm: 200, diameter_mm: 10} regulator:
-    {max_pressure_bar: 6} load: hanging_mass            # or constant_force sensors:
-    {contraction_noise_mm: 0.03, pressure_noise_bar: 0.008} history: {cycles_since_rest: 0,
-    rezeroed: false} repeats: [[holds_a, holds_b]] # segments that repeat one another valve_closed:
-    [shut]          # segments during which the valve is shut tolerance: {mass.load: 0.02}  #
-    relative tolerance of known parameters
+    plant: single_muscle
+    muscle: {rest_length_mm: 200, diameter_mm: 10}
+    regulator: {max_pressure_bar: 6}
+    load: hanging_mass            # or constant_force
+    sensors: {contraction_noise_mm: 0.03, pressure_noise_bar: 0.008}
+    history: {cycles_since_rest: 0, rezeroed: false}
+    repeats: [[holds_a, holds_b]] # segments that repeat one another
+    valve_closed: [shut]          # segments during which the valve is shut
+    tolerance: {mass.load: 0.02}  # relative tolerance of known parameters
 
 Every key but ``plant`` may be missing.
 """

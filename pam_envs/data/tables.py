@@ -201,7 +201,7 @@ def _path_fault(table: ContractionTable) -> str:
                 return (
                     f"{where}: the pressures must rise along the inflation rows and then fall "
                     "along the deflation rows; put the rows in the order of the readings, each "
-                    "pressure once a way"
+                    "pressure once per direction"
                 )
             if not np.array_equal(pressure, path):
                 return (

@@ -295,7 +295,7 @@ class ModifiedMaxwellSlip(ParallelElements, HysteresisModel):
         if usage.unit_slope:
             raise ValueError(
                 f"hysteresis: a modified Maxwell-slip model turns pressure into stiffness, which "
-                f"{usage.plant} has not; give a PlayOperator, a Preisach operator or None"
+                f"{usage.plant} does not have; give a PlayOperator, a Preisach operator or None"
             )
         if n > MOST or len(self.spring) != n + 1:
             raise ValueError(

@@ -166,8 +166,8 @@ def _answers(rig: Rig, inputs: Array) -> Array:
     outputs = np.asarray(rig(inputs), float)
     if outputs.shape != inputs.shape or not np.all(np.isfinite(outputs)):
         raise ValueError(
-            f"the rig answered {inputs.shape} inputs with outputs of shape {outputs.shape}; it must"
-            " give one finite number for each: let it settle after every input"
+            f"the rig returned outputs of shape {outputs.shape} for inputs of {inputs.shape}; it "
+            "must give one finite number for each: let it settle after every input"
         )
     return outputs
 

@@ -25,7 +25,7 @@ def rebind(
     Parameters
     ----------
     function : callable
-        A kernel. It is copied anew in every call.
+        A kernel. It is copied again in every call.
     names : dict
         Values for global names, wherever the call graph uses them.
     finish : callable

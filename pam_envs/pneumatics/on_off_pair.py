@@ -22,7 +22,7 @@ from pam_envs.parameters import assumed, derived, published
 
 _MAKER = (
     "maker's data sheet of the V100 series, standard V114, the valve that chakarov2018 names in "
-    "section 4 and says no more of"
+    "section 4 without further data"
 )
 _LOST = "a digit is lost in the copy of the " + _MAKER
 _RESTORED = _LOST + "; restored so that the flow from 6 to 5 bar is the 8.4 l/min that it states"

@@ -180,7 +180,7 @@ def test_malformed_files_are_refused(tmp_path, text, problem):
     path.write_bytes(text.encode("latin-1"))
     assert problem in refusal(path)
     assert "cannot be read" in refusal(tmp_path / "none.csv")
-    assert "5 rows are no recording" in refusal(write(tmp_path, sheet(5)))
+    assert "5 rows are too few" in refusal(write(tmp_path, sheet(5)))
 
 
 # cells
@@ -231,7 +231,7 @@ def test_time_must_increase_inside_a_segment(tmp_path):
     columns["time_s"][20] = columns["time_s"][19]
     columns["time_s"][80] = 0.3
     text = refusal(write(tmp_path, columns))
-    assert "does not go up inside a segment at rows 22 and 82" in text
+    assert "does not increase inside a segment at rows 22 and 82" in text
     assert "from 0.38 s to 0.38 s" in text
 
 

@@ -56,9 +56,9 @@ def read_clock(
     if stuck.any():
         at = np.flatnonzero(stuck)
         return None, [
-            f"time_s does not go up inside a segment at {rows_text(rows[at + 1])} (the first from "
-            f"{time[at[0]]:g} s to {time[at[0] + 1]:g} s); sort the rows, or give what was "
-            "recorded from rest with a clock of its own a new segment"
+            f"time_s does not increase inside a segment at {rows_text(rows[at + 1])} (the first "
+            f"from {time[at[0]]:g} s to {time[at[0] + 1]:g} s); sort the rows, or give rows that "
+            "start from rest with their own clock a new segment"
         ]
     inside = step[~new]
     if not len(inside):
@@ -129,8 +129,8 @@ def _gaps(
         lost = time[i + 1] - time[i]
         problems.append(
             f"nothing was recorded for {lost:g} s ({lost / period:.0f} periods) between rows "
-            f"{rows[i]} and {rows[i + 1]}, inside segment {segments[segment[i]]!r}; give what "
-            "follows a label and, if it starts from rest, a clock of its own, or leave it out"
+            f"{rows[i]} and {rows[i + 1]}, inside segment {segments[segment[i]]!r}; give the "
+            "rows after it a label and, if they start from rest, their own clock, or leave them out"
         )
     if len(inside) > 5:
         problems.append(f"there are {len(inside) - 5} more gaps inside segments")

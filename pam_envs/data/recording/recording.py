@@ -305,7 +305,7 @@ def _recording(
 ) -> Recording:
     """Return columns of a file (by field, in SI) as a recording."""
     if len(rows) < LEAST_ROWS:
-        refuse(source, f"{len(rows)} rows are no recording; give at least {LEAST_ROWS}")
+        refuse(source, f"{len(rows)} rows are too few; give at least {LEAST_ROWS}")
     segments = tuple(dict.fromkeys(labels))
     index = {label: i for i, label in enumerate(segments)}
     segment = np.array([index[label] for label in labels], dtype=np.int64)

@@ -78,5 +78,5 @@ def load_changes(
     names = ", ".join(repr(segments[i]) for i in dict.fromkeys(segment[at].tolist()))
     return [
         f"the load changes inside segment {names} at {rows_text(rows[at])}; if load_N is the "
-        "reading of a load cell, call the column force_N and give what hangs as load_N"
+        "reading of a load cell, call the column force_N and give the hanging load as load_N"
     ]

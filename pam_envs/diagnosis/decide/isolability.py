@@ -183,7 +183,7 @@ def _too_small(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
     return {
         cause.name: (
             f"within its bounds it shows at most {reach.get(cause.name, 0.0):.2g} times the noise "
-            "here, once the plant is refitted"
+            "of this recording after a refit of the plant"
         )
         for cause in causes
         # the time of an event is searched in the residual

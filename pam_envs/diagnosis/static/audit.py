@@ -50,13 +50,13 @@ class SetPoint:
         way = "deflating" if self.falling else "inflating"
         where = " and ".join(f"{load:g}" for load in self.loads)
         size = " and ".join(f"{abs(miss):.2f}" for miss in self.missed)
-        side = "low" if self.missed[0] < 0.0 else "high"
+        side = "below" if self.missed[0] < 0.0 else "above"
         others = " and ".join(f"{value:+.2f}" for value in self.others)
         rest = f", the other loads by {others} mm" if others else ""
         more = "" if others else ", or an effect that all models lack"
         return (
-            f"at {self.pressure:g} bar {way} the readings at {where} kg are {size} mm {side} of "
-            f"what all other pressures predict{rest}: probably a missed setpoint, which repeats "
+            f"at {self.pressure:g} bar {way} the readings at {where} kg are {size} mm {side} the "
+            f"prediction from all other pressures{rest}: probably a missed setpoint, which repeats "
             f"cannot show{more}; measure this pressure again"
         )
 

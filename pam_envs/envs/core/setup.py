@@ -239,7 +239,7 @@ def check_state(state: Any, like: tuple[NDArray[Any], ...]) -> list[NDArray[Any]
         wrong = part < 0 if name == "counts" else ~np.isfinite(part)
         if wrong.any():
             raise ValueError(
-                f"the state's {name!r} hold {part[wrong][0]}, which no state of get_state does"
+                f"the state's {name!r} hold {part[wrong][0]}, which get_state never returns"
             )
         parts.append(part)
     return parts

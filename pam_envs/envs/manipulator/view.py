@@ -163,7 +163,7 @@ def _numbers(canvas: S.Canvas, plant: Any, info: Any) -> None:
 
 
 def _upright(path: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points (3, k) with the height [m] above the base in the place of the depth."""
+    """Return points (3, k) with the height [m] above the base instead of the depth."""
     return path * np.array([[1.0], [1.0], [-1.0]])
 
 

@@ -1,4 +1,4 @@
-"""Effects of a plant with antagonistic pairs: kernels in the place of the plain placeholders.
+"""Effects of a plant with antagonistic pairs: kernels that replace the placeholders.
 
 Every muscle has the effects of its path (``core.muscle_path``), with the same parameters; the
 bearing of a single joint sticks and slips; each sensor has the effects of sensors. In the reduced

@@ -24,7 +24,7 @@ def drives_for(plant: Plant, channels: Mapping[str, ArrayLike]) -> Array:
     unknown = set(channels) - set(defaults)
     if unknown:
         raise ValueError(
-            f"nothing named {min(unknown)!r} drives a {plant.family}; there are: "
+            f"{min(unknown)!r} is not an input of a {plant.family}; the inputs are: "
             + ", ".join(defaults)
         )
     return drives_of([channels.get(name, usual) for name, usual in defaults.items()])

@@ -28,7 +28,7 @@ from pam_envs.kernels.build import (
 from pam_envs.plants.core.tiles import first_of, in_tiles
 
 BEGIN, REST, REZERO = 1, 2, 4
-"""Flags of a control period: begin anew; come to rest instead of advancing; zero the sensor."""
+"""Flags of a control period: restart; come to rest instead of advancing; zero the sensor."""
 STEP, STACK_COUNT = 3, 5
 """Rows of every plant's whole numbers: control period, first count of its hysteresis operators."""
 

@@ -1,4 +1,4 @@
-"""Effects of the elbow orthosis: kernels in the place of the plain plant's placeholders.
+"""Effects of the elbow orthosis: kernels that replace the placeholders.
 
 With proportional valves both bundles have all effects of their path; with on/off valves creep,
 first cycles and temperature. The bearing sticks and slips, and the sensors have their effects.

@@ -1,4 +1,4 @@
-"""Effects of the knee orthosis: kernels in the place of the plain plant's placeholders.
+"""Effects of the knee orthosis: kernels that replace the placeholders.
 
 The muscle has the effects of its path (those of the air only behind the regulator's lag); the
 hysteresis turns the effective pressure into stiffness. The bearing of the brace without a leg

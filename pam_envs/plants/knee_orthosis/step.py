@@ -24,7 +24,7 @@ from pam_envs.pneumatics.measured_dynamics import MODES, REAL_MODES, pair_factor
 __all__ = ["N_WORK", "advance", "begin_lane", "replacements", "start_hysteresis"]
 
 PAIR = K.MODE_TABLE + 2 * REAL_MODES
-"""First row of what the slow pair is made of: decay, frequency, two gains."""
+"""First row of the parameters of the slow pair: decay, frequency, two gains."""
 
 # placeholders, filled in for each hysteresis, mounting and regulator
 write_stiffness: Any = None

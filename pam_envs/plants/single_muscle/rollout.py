@@ -32,7 +32,7 @@ from pam_envs.plants.single_muscle.step import N_WORK, advance, rest_contraction
 OUTPUTS = ("contraction", "velocity", "pressure", "drive")
 COMMAND, LOAD, KELVIN, START_PRESSURE, HELD = range(5)
 """Channels that drive a muscle: setpoint [Pa], below zero with the valve shut; load [kg];
-temperature [K]; and, where it begins anew, its pressure and the setpoint before [Pa]."""
+temperature [K]; and, where it restarts, its pressure and the setpoint before [Pa]."""
 N_ROWS = 0  # a placeholder
 
 

@@ -10,7 +10,7 @@ CAUSE = Cause(
     name="sensor_delay",
     title="the delay of the position sensor",
     forms=(Form("delay", (Term("position.delay", (0.02,), scale=0.01),)),),
-    signature="the error follows the velocity by the same time at every speed; the pressure fits",
+    signature="the error is that of the same delay at every speed; the pressure fits",
     neighbours=("dead_time", "viscous_loss"),
     experiment=(
         "A sine at 0.2, 0.5, 1 and 2 Hz: a delay shifts all by one time without attenuation, a "
