@@ -175,10 +175,12 @@ def preset_path(env: str, algo: str, variant: str = "") -> Path:
     if algo not in ALGORITHMS:
         raise SettingsError(f"algo = {algo!r} is not known{near(algo, ALGORITHMS)}")
     if (env, algo, variant) not in found:
-        ids = [e for e, a, v in found if (a, v) == (algo, variant)]
+        ids = {e: None for e, _, _ in found}
+        kinds = sorted(f"{a}-{v}" if v else a for e, a, v in found if e == env)
         what = f"{algo}-{variant}" if variant else algo
+        hint = near(what, kinds) if env in ids else near(env, ids)
         raise SettingsError(
-            f"no {what} preset for {env!r}{near(env, ids)} For your own file: --config FILE"
+            f"no {what} preset for {env!r}{hint}; for your own settings use --config FILE"
         )
     return found[env, algo, variant]
 

@@ -42,7 +42,11 @@ def load(path: Path) -> dict[str, Any]:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise CheckpointError(f"no checkpoint can be read at {path}: {error.strerror}") from error
+        raise CheckpointError(
+            f"no checkpoint can be read at {path}: {error.strerror}; give the folder of a run with "
+            "--out, or start anew without --resume (the first checkpoint is written after "
+            "checkpoint_steps, 500,000 by default)"
+        ) from error
     if not data.startswith(MARK):
         raise CheckpointError(
             f"{path.name} is not a checkpoint of this project, and files of other programs are not "

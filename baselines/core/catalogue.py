@@ -31,6 +31,7 @@ from baselines.core.controller import Controller
 from baselines.core.entry import Entry, Spec
 from baselines.core.knobs import AS_DESIGNED, Knobs, check_knobs
 from pam_envs.parameters import Signals
+from pam_envs.wording import near
 
 VARIABLE = "PAM_ENVS_CONTROLLERS"
 PUBLISHED: dict[str, Entry] = {}
@@ -105,13 +106,15 @@ def make_controller(
     """
     entry = CONTROLLERS.get(name)
     if entry is None:
-        raise ValueError(f"no controller named {name!r}; there are: {', '.join(CONTROLLERS)}")
+        raise ValueError(f"no controller named {name!r}{near(name, CONTROLLERS)}")
     check_knobs(name, entry.knobs, knobs)
     if entry.plants and not isinstance(plant, entry.plants):
         raise ValueError(
             f"{name} is for a {' or '.join(family.__name__ for family in entry.plants)}, and the "
-            f"plant is a {type(plant).__name__}; choose a controller whose envs name the "
-            "environment"
+            f"plant is a {type(plant).__name__}; for this plant there are: "
+            + ", ".join(
+                n for n, e in CONTROLLERS.items() if not e.plants or isinstance(plant, e.plants)
+            )
         )
     factors = {**entry.found, **knobs}
     made: Controller = entry.make(Spec(plant, signals, action_signals, factors, seed))

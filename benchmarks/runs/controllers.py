@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from pam_envs.wording import near
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -114,7 +116,7 @@ def find(name: str) -> Entrant:
     """Return a controller by name; raise ValueError naming the known ones."""
     known = available()
     if name not in known:
-        raise ValueError(f"no controller named {name!r}; there are: {', '.join(sorted(known))}")
+        raise ValueError(f"no controller named {name!r}{near(name, sorted(known))}")
     return known[name]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 import inspect
 import sys
@@ -21,6 +20,7 @@ from pam_envs.envs.core.step import MOST_PREVIEW
 from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.hysteresis.protocol import kinds, model_of
 from pam_envs.parameters import check, declarations
+from pam_envs.wording import near
 
 T = TypeVar("T")
 
@@ -101,8 +101,8 @@ class Common:
         made: Any = kind.from_yaml(plant) if isinstance(plant, (str, Path)) else plant  # type: ignore[attr-defined]
         if not isinstance(made, kind):
             raise ValueError(
-                f"plant = {str(plant)[:60]!r} must be a {kind.__name__}, the path of a plant file, "
-                "or None"
+                f"plant must be a {kind.__name__}, the path of a plant file, or None, not a "
+                f"{type(plant).__name__}"
             )
         own = made.hysteresis.choice  # type: ignore[attr-defined]
         if hysteresis is not None and model_of(hysteresis).identity:
@@ -178,8 +178,7 @@ class Common:
         for name, span in ranges.items():
             if name not in allowed:
                 raise ValueError(
-                    f"randomize: {name!r} is not a parameter that can be drawn; there are: "
-                    + ", ".join(allowed)
+                    f"randomize: {name!r} is not a parameter that can be drawn{near(name, allowed)}"
                 )
             if (
                 isinstance(span, str)
@@ -228,7 +227,7 @@ def environment_arguments(
     """Give a function the arguments of :class:`Common`, with these defaults, beside its own.
 
     The function gets a :class:`Common` as its first argument. An argument of an unknown name raises
-    a ``TypeError`` that lists the known ones; every check raises a ``ValueError`` that names the
+    a ``TypeError`` with the nearest known one; every check raises a ``ValueError`` that names the
     argument, its value, the bounds and the remedy.
     """
     defaults = Common(reference, preview, preview_stride, episode_seconds)
@@ -248,11 +247,7 @@ def environment_arguments(
         def made(*given: Any, **arguments: Any) -> Setup:
             unknown = {*arguments} - {*known, *(p.name for p in fixed)}
             for name in sorted(unknown):
-                close = difflib.get_close_matches(name, known, n=1)
-                hint = f", but {close[0]!r}" if close else ""
-                raise TypeError(
-                    f"there is no argument {name!r}{hint}; the arguments are {', '.join(known)}"
-                )
+                raise TypeError(f"there is no argument {name!r}{near(name, known)}")
             common = {p.name: arguments.pop(p.name) for p in shared if p.name in arguments}
             return make(dataclasses.replace(defaults, **common), *given, **arguments)
 

@@ -19,6 +19,7 @@ from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
 from pam_envs.plants.core.operator_component import OperatorComponent
+from pam_envs.wording import near
 
 
 class UnstableParameters(ValueError):
@@ -154,7 +155,7 @@ class Plant:
             component, _, entry = name.partition(".")
             known = component in self.components and entry in declarations(getattr(self, component))
             if not known and name != "hysteresis.operator":
-                raise ValueError(f"no parameter named {name!r}; there are: {', '.join(self.names)}")
+                raise ValueError(f"no parameter named {name!r}{near(name, self.names)}")
             changed.setdefault(component, {})[entry] = value
         parts: dict[str, Any] = {
             c: dataclasses.replace(getattr(self, c), **v) for c, v in changed.items()

@@ -137,7 +137,8 @@ def read(cls: type[P], path: Path) -> P:
     keys = (*KEYS, *cls.choices)
     unknown = [str(k) for k in data if k not in keys]
     if unknown:
-        raise ValueError(f"{where}: unknown key {unknown[0]!r}; known: {', '.join(keys)}")
+        rig = "; this looks like a rig file" if "plant" in data else ""
+        raise ValueError(f"{where}: unknown key {unknown[0]!r}{rig}; known: {', '.join(keys)}")
     if data.get("schema") != 1:
         raise ValueError(f"{where}: schema is {data.get('schema')!r}; this version reads schema 1")
     if data.get("family") != cls.family:

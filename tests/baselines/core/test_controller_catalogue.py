@@ -109,8 +109,8 @@ def test_catalogue_is_imported_without_python_control_and_cvxpy():
     assert done.stdout.strip() == "set()"
 
 
-def test_unknown_name_lists_the_known_ones():
-    with pytest.raises(ValueError, match="inverse_pid"):
+def test_unknown_name_suggests_the_nearest():
+    with pytest.raises(ValueError, match="did you mean 'pid'"):
         built("pdi", make_env())
 
 

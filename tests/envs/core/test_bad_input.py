@@ -147,7 +147,7 @@ def test_bad_batches_change_nothing(name: str) -> None:
         ({"reward": {"luck": 1.0}}, "keys among "),
         ({"reward": {"effort_weight": -1.0}}, "outside its bounds"),
         ({"plant": "/nowhere/rig.yaml"}, "cannot be read"),
-        ({"plant": 7}, "plant = '7' must be a "),
+        ({"plant": 7}, "plant must be a "),
     ],
 )
 def test_bad_common_arguments_are_refused(name: str, arguments: dict[str, Any], said: str) -> None:
@@ -180,8 +180,8 @@ def test_bad_arguments_of_muscle_positioning_are_refused(
 
 
 @EVERY
-def test_unknown_argument_lists_the_known_ones(name: str) -> None:
-    said = "no argument 'previev', but 'preview'; the arguments are .*episode_seconds"
+def test_unknown_argument_suggests_the_nearest(name: str) -> None:
+    said = "no argument 'previev'; did you mean 'preview'"
     with pytest.raises(TypeError, match=said):
         gym.make(name, previev=3)
     with pytest.raises(TypeError, match=said):
