@@ -182,11 +182,11 @@ def test_author_is_read_from_the_record(tmp_path: Path, monkeypatch: pytest.Monk
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"seed": 4}, "of seed 4, and should be of 3"),
-        ({"seed": None}, "of seed None, and should be of 3"),
-        ({"seed": 3, "env": "PAM/KneeWalk-v0"}, "of env 'PAM/KneeWalk-v0'"),
-        ({"seed": 3, "algo": "sac"}, "of algo 'sac'"),
-        ({"seed": 3, "baseline": {"name": "pid"}}, "of baseline 'pid'"),
+        ({"seed": 4}, "seed 4, its file name 3"),
+        ({"seed": None}, "seed None, its file name 3"),
+        ({"seed": 3, "env": "PAM/KneeWalk-v0"}, "has env 'PAM/KneeWalk-v0'"),
+        ({"seed": 3, "algo": "sac"}, "has algo 'sac'"),
+        ({"seed": 3, "baseline": {"name": "pid"}}, "has baseline 'pid'"),
     ],
 )
 def test_policy_under_another_file_name_is_refused(
