@@ -53,7 +53,7 @@ def run(
         env: Id of an environment; all by default.
         controller: Names of controllers; all by default.
         track: Names of scenario files, or paths of such files; all files by default.
-        dry_run: List the cells and whether they are there, and stop.
+        dry_run: List the cells and whether they are stored, and stop.
     """
     from benchmarks import console
 
@@ -84,7 +84,7 @@ def audit(
 ) -> int:
     """Draw a round of seeds for all controllers of a track, and score them on it.
 
-    Where nothing has changed since the last round, none is drawn.
+    No round is drawn if nothing has changed since the last one.
 
     Args:
         track: Names of scenario files.
@@ -124,7 +124,7 @@ def show_row(row: Positional[tuple[str, ...]], json: bool = False) -> int:
 
     Args:
         row: Files or names of rows.
-        json: Print all that is stored instead, as JSON with every digit.
+        json: Print the complete row instead, as JSON with every digit.
     """
     from json import dumps
 
@@ -193,10 +193,10 @@ def verify(
 
 
 def void(row: Positional[tuple[str, ...]] = (), all: bool = False) -> int:
-    """List rows whose task or controller has changed, by behaviour; exit code 1 if there are some.
+    """List rows whose task or controller has changed in behaviour; exit code 1 if there are any.
 
-    Every environment runs one short episode and every controller answers stored observations;
-    no row is computed again.
+    Every environment runs one short episode and every controller gets stored observations; no
+    row is computed again.
 
     Args:
         row: Files or names of rows.
@@ -240,14 +240,14 @@ def tune(
     write: bool = False,
     storage: Path | None = None,
 ) -> int:
-    """Search the free numbers of a paper's controller on tuning seeds; it can be resumed.
+    """Search a paper controller's free parameters on tuning seeds; an interrupted search resumes.
 
     Args:
         controller: Name of a controller with knobs.
         env: Id of the environment, where the controller runs in several.
-        trials: Settings to try, those of earlier calls counted in.
-        seed: Of the sampler.
-        episodes: Of each trial at least.
+        trials: Number of settings to try, including those of earlier calls.
+        seed: Seed of the sampler.
+        episodes: Smallest number of episodes of each trial.
         write: Write the result into baselines/core/tuned.yaml, which the catalogue reads.
         storage: SQLite file of the trials, runs/tuning.db by default.
     """
@@ -267,7 +267,7 @@ def tune(
 
 
 def papers(json: Path | None = None) -> int:
-    """Print published figures beside ours; exit code 1 if one is out of tolerance.
+    """Compare published figures with ours; exit code 1 if one is out of tolerance.
 
     Args:
         json: Also write them to this file.
@@ -385,19 +385,19 @@ def diagnosis(
 
     Args:
         chosen: Set of cases.
-        offset: Another number draws other cases.
+        offset: Number of the draw; another number gives other cases.
         fraction: Part of the cases of every kind and cause, for a quick look.
         kind: Only cases of these kinds.
         name: Only cases that hide one of these effects.
-        limit: Most cases.
+        limit: Largest number of cases.
         loops: Cases of every cause that are run in closed loop on the hidden rig.
         next: Carry out the experiments that are proposed.
-        force: Compute again what is there already.
-        rejudge: Run nothing; judge what earlier runs recorded by the present rule.
+        force: Compute stored cases again.
+        rejudge: Run nothing; apply the present rule to the records of earlier runs.
         timed: Also time whole reports of ten minutes at 50 Hz on two cores, afterwards.
-        cells: Folder of the records, the checkpoint.
-        out: Folder of the page, of its numbers and of its figure. By default benchmarks/results for
-            the whole of the final set, otherwise beside the records.
+        cells: Folder of the records, which are the checkpoint.
+        out: Folder of the page, its numbers and its figure. By default benchmarks/results for the
+        whole final set, otherwise beside the records.
     """
     from benchmarks.diagnosis import report as telling
     from benchmarks.diagnosis import run as running

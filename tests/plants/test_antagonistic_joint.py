@@ -105,9 +105,9 @@ def test_kernel_feedforward_equals_that_of_the_plant(plant: AntagonisticJoint) -
     for angle in np.linspace(*plant.angle_range, 13):
         for prestress in (20.0, 50.0, 120.0):
             p_a, p_b, short = feed_forward(fixed, 0, float(angle), prestress)
-            wanted = plant.pressures_for(angle, prestress)
-            assert (p_a, p_b) == pytest.approx((float(wanted[0]), float(wanted[1])), rel=1e-9)
-            assert bool(short) == bool(wanted[2]) is False
+            desired = plant.pressures_for(angle, prestress)
+            assert (p_a, p_b) == pytest.approx((float(desired[0]), float(desired[1])), rel=1e-9)
+            assert bool(short) == bool(desired[2]) is False
 
 
 def test_set_point_out_of_reach_is_reported() -> None:

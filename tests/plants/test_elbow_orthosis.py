@@ -79,12 +79,12 @@ def test_torque_and_stiffness_are_met_exactly(counts: tuple[int, int]) -> None:
     p_a, p_b = drawn.uniform(0.0, FULL, (2, 200))
     made = plant.allocate(q, plant.torque(q, p_a, p_b), plant.stiffness(q, p_a, p_b))
     assert np.abs(np.array(made) - (p_a, p_b)).max() < 1e-9 * FULL
-    wanted = drawn.uniform(-20.0, 20.0, 200), drawn.uniform(1.0, 15.0, 200)
-    x_a, x_b = plant.coefficients(*plant.allocate(q, *wanted))
+    desired = drawn.uniform(-20.0, 20.0, 200), drawn.uniform(1.0, 15.0, 200)
+    x_a, x_b = plant.coefficients(*plant.allocate(q, *desired))
     shape_a, shape_b, slope_a, slope_b = plant.geometry(q)
     radius = plant.pulley.radius
-    assert np.abs(radius * (shape_b * x_b - shape_a * x_a) - wanted[0]).max() < 1e-9
-    assert np.abs(-(radius**2) * (slope_a * x_a + slope_b * x_b) - wanted[1]).max() < 1e-9
+    assert np.abs(radius * (shape_b * x_b - shape_a * x_a) - desired[0]).max() < 1e-9
+    assert np.abs(-(radius**2) * (slope_a * x_a + slope_b * x_b) - desired[1]).max() < 1e-9
 
 
 def test_plant_allocation_equals_that_of_the_allocation_module() -> None:

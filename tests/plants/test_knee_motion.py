@@ -163,8 +163,8 @@ def test_published_dynamics_relate_setpoint_to_tension() -> None:
 def tracking_error(plant: KneeOrthosis, command: Callable[[np.ndarray], np.ndarray]) -> float:
     """RMS over half range [1] of a stiffness that follows a sine of 0.1 Hz, 1 to 71 N/cm."""
     t = PERIOD * np.arange(2000)
-    wanted = 3600.0 - 3500.0 * np.cos(0.2 * np.pi * t)
-    made = simulate_knee(plant, np.clip(command(wanted), 0.0, 4.5e5))["stiffness"]
+    desired = 3600.0 - 3500.0 * np.cos(0.2 * np.pi * t)
+    made = simulate_knee(plant, np.clip(command(desired), 0.0, 4.5e5))["stiffness"]
     error = made - (3600.0 - 3500.0 * np.cos(0.2 * np.pi * (t + PERIOD)))
     return float(np.sqrt(np.mean(error[1000:] ** 2)) / 3500.0)
 
@@ -296,10 +296,10 @@ def test_activations_equal_the_emg_proxy() -> None:
     made = stride(plant)
     proxy = emg_proxy(made["demand"], made["torque"], PERIOD, plant.activation)
     settled = slice(50, None)
-    for name, wanted in (
+    for name, desired in (
         ("quads", proxy.extensors),
         ("quads_free", proxy.extensors_free),
         ("flexors", proxy.flexors),
         ("flexors_free", proxy.flexors_free),
     ):
-        assert np.allclose(made[name][settled], wanted[settled], atol=1e-6)
+        assert np.allclose(made[name][settled], desired[settled], atol=1e-6)

@@ -147,8 +147,8 @@ def test_untrained_residual_equals_its_controller() -> None:
     state = inner = None
     for step in range(25):
         action, state = made.predict(observation, state, step == 0)
-        wanted, inner = alone.predict(observation, inner, step == 0)
-        assert np.array_equal(action, wanted)
+        desired, inner = alone.predict(observation, inner, step == 0)
+        assert np.array_equal(action, desired)
         observation, *_ = single.step(action)
 
 
@@ -203,8 +203,8 @@ def test_terminal_observation_includes_the_controllers_action() -> None:
             break
         starts = done
     last = np.array([info["terminal_observation"] for info in infos])
-    wanted, _ = controller.predict(last[:, :-1], state, np.zeros(3, bool))
-    assert np.array_equal(last[:, -1:], wanted)
+    desired, _ = controller.predict(last[:, :-1], state, np.zeros(3, bool))
+    assert np.array_equal(last[:, -1:], desired)
     fresh, _ = controller.predict(observation[:, :-1], None, np.ones(3, bool))
     assert np.array_equal(observation[:, -1:], fresh)
 

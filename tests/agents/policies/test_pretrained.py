@@ -173,9 +173,7 @@ def test_author_is_read_from_the_record(tmp_path: Path, monkeypatch: pytest.Monk
     beside = json.loads(source.with_suffix(".json").read_text()) | {"author": "Doe, J."}
     (tmp_path / "MusclePositioning-v0.ppo.s0.json").write_text(json.dumps(beside))
     assert entry.author == "Doe, J."
-    assert (
-        entrants._entrant("ppo", entry, "agents.policies.catalogue", "learned").author == "Doe, J."
-    )
+    assert entrants._entrant("ppo", entry, "agents.policies.catalogue").author == "Doe, J."
     assert catalogue.load_pretrained("ppo").card["seed"] == 0
 
 

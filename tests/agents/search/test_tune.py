@@ -112,11 +112,11 @@ def test_budget_includes_earlier_searches(tmp_path: Path) -> None:
     path = tmp_path / "preset.yaml"
     path.write_text(configs.preset_path(ID, "ppo").read_text(encoding="utf-8"), encoding="utf-8")
     made = job(tmp_path, 1, search={"trials": 20, "earlier": 5})
-    wanted = dataclasses.replace(made, config=configs.read(path))
-    first = tune.write(wanted, tune.search(made, QUIET), path)
+    requested = dataclasses.replace(made, config=configs.read(path))
+    first = tune.write(requested, tune.search(made, QUIET), path)
     assert (first.search.trials, first.search.earlier) == (1, 25)
-    longer = dataclasses.replace(made, trials=2)  # the same search goes on
-    again = tune.write(wanted, tune.search(longer, QUIET), path)
+    longer = dataclasses.replace(made, trials=2)  # the same search continues
+    again = tune.write(requested, tune.search(longer, QUIET), path)
     assert (again.search.trials, again.search.earlier) == (2, 25)
 
 
@@ -129,15 +129,15 @@ def test_best_settings_and_budget_are_written(tmp_path: Path) -> None:
         "# why\n" + configs.preset_path(ID, "ppo").read_text(encoding="utf-8"), encoding="utf-8"
     )
     given = configs.read(path)
-    wanted = dataclasses.replace(made, config=given)
-    after = tune.write(wanted, study, path)
+    requested = dataclasses.replace(made, config=given)
+    after = tune.write(requested, study, path)
     assert configs.read(path) == after
     assert (after.search.trials, after.search.steps, after.search.seed) == (2, 256, 0)
     assert after.ppo.gamma != 0.0
     best = study.best_params["learning_rate"]
     assert after.ppo.learning_rate[0] == pytest.approx(best, rel=5e-3)
-    again = dataclasses.replace(wanted, config=after)
-    assert again.name == wanted.name
+    again = dataclasses.replace(requested, config=after)
+    assert again.name == requested.name
     text = path.read_text()
     assert text.startswith("# why\n")
     assert "# the untrained policy keeps the last setpoint" in text

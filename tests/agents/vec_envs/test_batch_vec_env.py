@@ -106,9 +106,9 @@ def test_requested_infos_are_reported_by_row() -> None:
     single.reset(seed=SEED + 2)
     for action in actions(12):
         _, _, done, infos = env.step(action)
-        last, _, _, _, wanted = single.step(action[2])
+        last, _, _, _, expected = single.step(action[2])
         extra = {"terminal_observation", "TimeLimit.truncated"} if done[2] else set()
-        assert {k: v for k, v in infos[2].items() if k not in extra} == wanted
+        assert {k: v for k, v in infos[2].items() if k not in extra} == expected
     assert done[2]
     assert np.array_equal(infos[2]["terminal_observation"], last)
 
@@ -161,8 +161,8 @@ def test_normalisation_reaches_the_terminal_observation() -> None:
         _, _, _, raw = plain.step(action)
     assert done.all()
     for i in range(N):
-        wanted = env.normalize_obs(raw[i]["terminal_observation"])
-        assert np.array_equal(infos[i]["terminal_observation"], wanted)
+        expected = env.normalize_obs(raw[i]["terminal_observation"])
+        assert np.array_equal(infos[i]["terminal_observation"], expected)
 
 
 def test_attributes_and_methods_are_those_of_the_batch() -> None:

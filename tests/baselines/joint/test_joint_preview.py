@@ -84,17 +84,17 @@ def _error(made) -> float:
     """Return the RMS error of a sine of 20 degrees and 0.5 Hz over its amplitude, no hysteresis."""
     motion = discrete(double_lag(POLE), PERIOD, "zoh")
 
-    def wanted(t):
+    def desired(t):
         return np.sin(np.pi * t)
 
     x, state, command, errors = motion.initial_state(), None, 0.0, []
     for k in range(600):
         now = PERIOD * k
-        seen = [float(motion.c @ x), command, *(0.35 * wanted(now + t) for t in TIMES)]
+        seen = [float(motion.c @ x), command, *(0.35 * desired(now + t) for t in TIMES)]
         action, state = made.predict(np.array(seen), state)
         command = float(action[0])
         x = motion.advance(command, x)
-        errors.append(float(motion.c @ x) / 0.35 - wanted(now + PERIOD))
+        errors.append(float(motion.c @ x) / 0.35 - desired(now + PERIOD))
     return float(np.sqrt(np.mean(np.square(errors[200:]))))
 
 

@@ -51,8 +51,8 @@ def test_previewed_pose_is_the_target() -> None:
     poses = ARM.pose(line[:2])
     seen = observation(line[0], poses[0], poses[1])
     action, _ = make_inverse_kinematics(SPEC, preview=1).predict(seen)
-    wanted = resolve(ARM, poses[1:], start=line[0]).angles[0]
-    np.testing.assert_allclose(set_points(action), wanted, atol=1e-6)
+    desired = resolve(ARM, poses[1:], start=line[0]).angles[0]
+    np.testing.assert_allclose(set_points(action), desired, atol=1e-6)
 
 
 def test_rows_of_a_batch_are_independent() -> None:

@@ -25,9 +25,9 @@ def test_nominal_hysteresis_equals_that_of_the_plant(plant):
         drive, state = muscle.advance(np.array([pressure]), state)
         expected, theirs = own.drive(np.array([pressure]), theirs)
         np.testing.assert_allclose(drive, expected, rtol=1e-12, atol=1e-6)
-        wanted = drive + np.array([2e4])
+        desired = drive + np.array([2e4])
         np.testing.assert_allclose(
-            muscle.pressure_for(wanted, state), own.pressure(wanted, theirs)[0], rtol=1e-9
+            muscle.pressure_for(desired, state), own.pressure(desired, theirs)[0], rtol=1e-9
         )
 
 
@@ -58,9 +58,9 @@ def test_first_measurement_explains_the_history(plant):
     drive, truth = muscle.advance(now, truth)
     state = muscle.explain(muscle.contraction_at(drive), now)
     for target in (1.2e5, 2.8e5):
-        wanted = np.full(3, target)
+        desired = np.full(3, target)
         np.testing.assert_allclose(
-            muscle.pressure_for(wanted, state), muscle.pressure_for(wanted, truth), atol=200.0
+            muscle.pressure_for(desired, state), muscle.pressure_for(desired, truth), atol=200.0
         )
 
 

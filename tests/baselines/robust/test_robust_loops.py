@@ -128,8 +128,8 @@ def test_synthesis_reproduces_the_frozen_loops():
 
 
 def test_fitted_scale_and_its_inverse_are_stable():
-    wanted = np.abs(from_roots([-3.0, -90.0], [-12.0, -40.0], 1.5)(1j * FREQUENCIES))
-    made = synthesis.fit_scale(wanted)
+    desired = np.abs(from_roots([-3.0, -90.0], [-12.0, -40.0], 1.5)(1j * FREQUENCIES))
+    made = synthesis.fit_scale(desired)
     assert np.max(made.poles().real) < 0.0 and np.max(made.zeros().real) < 0.0
     fitted = np.abs(made(1j * FREQUENCIES[synthesis.FITTED]))
-    np.testing.assert_allclose(fitted, wanted[synthesis.FITTED], rtol=1e-3)
+    np.testing.assert_allclose(fitted, desired[synthesis.FITTED], rtol=1e-3)

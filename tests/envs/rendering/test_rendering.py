@@ -71,7 +71,7 @@ def test_window_stays_closed_after_its_close_button(
     env.reset(seed=0)
     assert pygame.display.get_surface().get_size() == (800, 600)
     pygame.event.post(pygame.event.Event(pygame.QUIT))
-    for _ in range(4):  # the episode goes on, unseen
+    for _ in range(4):  # the episode continues without frames
         _, _, terminated, _, _ = env.step(env.action_space.high)
         assert not terminated
         assert not pygame.display.get_init()
