@@ -1,4 +1,4 @@
-"""Digest of everything that an object holds, to tell whether two objects are equal."""
+"""Digest of an object's complete content, for comparison of two objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sources by key: every key that the code names has its entry in references.bib."""
+"""Sources by key: every key in the code has an entry in references.bib."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command line, as a user calls it."""
+"""The command line from the user's side."""
 
 from __future__ import annotations
 

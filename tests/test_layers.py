@@ -1,4 +1,4 @@
-"""Modules that the library loads when it is used (import-linter checks the layers)."""
+"""Modules imported by use of the library (import-linter checks the layers)."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The snippets of the README run, in the order of the page, and what the pages link to is there."""
+"""Snippets of the README run in page order, and links of the pages resolve."""
 
 import re
 from pathlib import Path

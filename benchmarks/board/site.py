@@ -192,7 +192,7 @@ def _audit_words(row: Row) -> str:
 
 
 def again(row: Row, cost: views.Cost) -> list[str]:
-    """Return the commands that check the row, score the controller anew and train it again."""
+    """Return the commands that verify the row, score the controller and train it again."""
     return [
         f"python -m benchmarks verify {row['row']}",
         f"python -m benchmarks run --env {row['env']['id']} --controller {views.name_of(row)} "

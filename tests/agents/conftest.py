@@ -1,4 +1,4 @@
-"""Models trained for a moment, for the tests of learning; without torch there are no such tests."""
+"""Briefly trained models for the tests of learning, which are skipped without torch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows made by hand: scores that a test can work out, in the form that rows have."""
+"""Hand-made rows with known scores, in the format of real rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A cause is one file, with one more for its hidden counterpart: both added from outside."""
+"""Third-party cause: one file, and a second one for its hidden counterpart."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def steps(n: int, largest: float, every: int = 10, seed: int = 0) -> np.ndarray:
 def integrated(
     plant: AntagonisticJoint, commands: np.ndarray, payload: float, shove: float
 ) -> np.ndarray:
-    """Angle [rad] of a joint without hysteresis, from its differential equation written anew."""
+    """Angle [rad] of a joint without hysteresis, from an independent form of its equation."""
     muscle, lever, link = plant.muscle, plant.lever, plant.link
     inertia = link.inertia + payload * link.length**2
     moment = link.gravity * (link.mass * link.centre + payload * link.length)

@@ -28,7 +28,7 @@ def steps(n: int, every: int = 10, seed: int = 0) -> np.ndarray:
 
 
 def integrated(plant: KneeOrthosis, set_points: np.ndarray, start: dict[str, float]) -> np.ndarray:
-    """Angle [rad] of a plant without hysteresis, from its differential equations written anew."""
+    """Angle [rad] of a plant without hysteresis, from an independent form of its equations."""
     lever, leg, muscle = plant.lever, plant.leg, plant.muscle
     worn = plant.mounting == "leg"
     time = plant.stride.time

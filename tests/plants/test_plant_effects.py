@@ -1,4 +1,4 @@
-"""Effects of every plant: each does what its physics says, and neutral values change nothing."""
+"""Effects of every plant: physical response, and neutral values that change nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Replay of a recording: the same bits whatever is replayed beside it."""
+"""Replay of a recording: bits independent of the other lanes."""
 
 from __future__ import annotations
 

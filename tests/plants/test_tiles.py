@@ -1,4 +1,4 @@
-"""Plants side by side: which may run together, and how they are laid out."""
+"""Plants in one batch: compatibility and memory layout."""
 
 from __future__ import annotations
 

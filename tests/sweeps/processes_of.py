@@ -1,4 +1,4 @@
-"""Programs that are killed, and the processes that belong to them."""
+"""Kill of programs, and their child processes."""
 
 from __future__ import annotations
 

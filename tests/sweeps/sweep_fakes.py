@@ -1,4 +1,4 @@
-"""Tasks whose workers live, fail and die."""
+"""Tasks that succeed, fail or kill their workers."""
 
 from __future__ import annotations
 

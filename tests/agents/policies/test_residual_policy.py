@@ -1,4 +1,4 @@
-"""Residual policies: recorded answers of the controller, its state, the catalogue."""
+"""Residual policies: recorded actions of the controller, its state, the catalogue."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sweeps of training seeds: the same policies as single trainings, whatever is killed."""
+"""Sweeps of training seeds: the same policies as single trainings, even after kills."""
 
 from __future__ import annotations
 

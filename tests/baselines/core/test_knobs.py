@@ -1,4 +1,4 @@
-"""Knobs: no effect at 1, the effect of their name elsewhere, bounds, and tuned controllers."""
+"""Knobs: neutral at 1, effect at other values, bounds, and tuned controllers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Audit rounds: one salt a track, drawn after all artefacts; trying many variants gains nothing."""
+"""Audit rounds: one salt per track, drawn after all artefacts; no gain from selecting variants."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ class Reworded(ast.NodeTransformer):
 
 
 def reformat(folder: Path) -> None:
-    """Reword all docstrings, drop all comments and format anew the code of a folder."""
+    """Reword all docstrings, drop all comments and reformat the code of a folder."""
     for path in folder.rglob("*.py"):
         tree = Reworded().visit(ast.parse(path.read_text(encoding="utf-8")))
         path.write_text(ast.unparse(ast.fix_missing_locations(tree)), encoding="utf-8")

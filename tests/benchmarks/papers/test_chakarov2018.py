@@ -1,4 +1,4 @@
-"""chakarov2018: figures of the elbow orthosis, met or named as missed, and the page on it."""
+"""chakarov2018: figures of the elbow orthosis, known misses, and the documentation page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commit of a result, with a mark where code differs from it."""
+"""The commit of a result, with a mark for changed code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A family of environments from outside the package: one folder and one scenario file."""
+"""Third-party family of environments: one folder and one scenario file."""
 
 from __future__ import annotations
 
