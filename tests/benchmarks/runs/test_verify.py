@@ -49,7 +49,7 @@ def verdict_of(board: Path, name: str) -> verify.Verdict:
 
 @pytest.fixture
 def forged(board: Path) -> Iterator[Callable[..., verify.Verdict]]:
-    """Return a function that alters a row, renews its checksum and verifies it; then it is restored."""
+    """Return a function that alters a row, renews its checksum, verifies it and restores it."""
     kept: dict[Path, bytes] = {}
 
     def alter(name: str, change: Change, loads: bool = True) -> verify.Verdict:
