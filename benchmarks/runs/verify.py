@@ -39,7 +39,7 @@ Between Zen 5 and Rocket Lake, in all episodes of the board, 1.4e-7 was the larg
 SLACK = 1e-6
 """Share of the worst case that counts as equal, for scores near zero."""
 DRAWN = 1e-3
-"""Largest deviation of a drawn signal, as a share of its range."""
+"""Largest deviation of a plotted signal, as a share of its range: two steps of its grid."""
 ROUNDED = ("scores", "trajectory", "saturated")
 """Entries of an episode that rounding changes; a signal may just reach its bound."""
 
@@ -48,7 +48,8 @@ ROUNDED = ("scores", "trajectory", "saturated")
 class Verdict:
     """Result of computing a row again.
 
-    It was compared to the last bit, or within the rounding of another machine (``mode``).
+    It was compared to the last bit, or within the rounding of another machine (``mode``); plotted
+    curves, which are rounded to a grid, always to ``DRAWN``.
     ``drifted`` are the fields that differ, with both values; ``notes`` are differences that are no
     drift by themselves: versions, commit, description. ``checksum`` is that of the row's file.
     """
@@ -175,12 +176,13 @@ def _compare(stored: Record, again: Record, verdict: Verdict) -> None:
     made, here = (row.pop("made_with", {}) for row in (before, after))
     verdict.notes += differences(made, here, "made_with")
     verdict.notes += differences(_described(before), _described(after), "description")
-    verdict.drifted += (drifted := differences(before, after))
+    curves = list(_other_curves(before.pop("traces"), after.pop("traces")))
+    drifted = differences(before, after)
     if drifted and any(made.get(key) != here.get(key) for key in ("packages", "cpu")):
         verdict.mode = verified.ELSEWHERE
         verdict.notes.append(f"{len(drifted)} fields differ in bits, the first: {drifted[0]}")
-        beyond = beyond_rounding(before, after)
-        verdict.drifted[:] = [line for line in verdict.drifted if line not in drifted] + beyond
+        drifted = beyond_rounding(before, after)
+    verdict.drifted += drifted + curves
 
 
 def _described(row: dict[str, Any]) -> dict[str, Any]:
@@ -209,7 +211,7 @@ def beyond_rounding(before: Record, after: Record) -> list[str]:
         for metric, value in new["scores"].items():
             where, slack = f"episodes[{k}].scores.{metric}", SLACK * float(worst[metric])
             found += differences(old["scores"].get(metric), value, where, ROUNDING, slack)
-    return found + list(_other_curves(before["traces"], after["traces"]))
+    return found
 
 
 def _exact(row: Record) -> dict[str, Any]:
@@ -217,7 +219,7 @@ def _exact(row: Record) -> dict[str, Any]:
 
     Without recorded actions in a round, the digest of a controller depends on rounding.
     """
-    kept, about = _without(row, "episodes", "traces", "controller"), row["controller"]
+    kept, about = _without(row, "episodes", "controller"), row["controller"]
     artefact = about["artefact"] if row["audit"] else _without(about["artefact"], "digest")
     return {**kept, "controller": {**about, "artefact": artefact}}
 
@@ -227,7 +229,7 @@ def _without(record: Record, *keys: str) -> dict[str, Any]:
 
 
 def _other_curves(old: list[Any], new: list[Any]) -> Iterator[str]:
-    """Yield which drawn signals differ by more than a thousandth of their range."""
+    """Yield which plotted signals differ by more than ``DRAWN``."""
     before, after = ([{**t, "signals": sorted(t["signals"])} for t in both] for both in (old, new))
     other = differences(before, after, "traces")
     yield from other

@@ -163,8 +163,8 @@ FORGERIES: dict[str, tuple[str, Change, str]] = {
     "no audit": ("trained", without_audit, "audit: left out, though round 1 was drawn on 20"),
     "picture": (
         "trained",
-        put("traces.0.signals.output.high", a_hair_less),
-        "traces[0].signals.output.high",
+        put("traces.0.signals.output", lambda curve: traces.pack(0.99 * traces.unpack(curve))),
+        "traces[0].signals.output: another curve now",
     ),
 }
 
@@ -173,6 +173,20 @@ FORGERIES: dict[str, tuple[str, Change, str]] = {
 def test_forged_entry_is_detected(what: str, forged: Any) -> None:
     name, change, words = FORGERIES[what]
     assert_drifted(forged(name, change), words)
+
+
+@pytest.mark.parametrize(("steps", "holds"), [(1, True), (3, False)])
+def test_plotted_curves_may_differ_by_the_step_of_their_grid(
+    steps: int, holds: bool, forged: Any
+) -> None:
+    def shift(curve: Row) -> Row:
+        values = traces.unpack(curve)
+        values[1] += steps / traces.GRID * (curve["high"] - curve["low"])
+        return traces.pack(values)
+
+    verdict = forged("integral", put("traces.0.signals.output", shift))
+    assert verdict.holds is holds
+    assert verdict.mode == "bits"
 
 
 def test_changed_description_is_a_note(forged: Any) -> None:
@@ -352,10 +366,6 @@ FOUND_ELSEWHERE: dict[str, tuple[Change, str]] = {
     "episode": (put(RMS, lambda error: 0.999 * error), "].scores.rms_error"),
     "failure": (put("episodes.-1.failure", "the weather"), "].failure"),
     "dropped": (lambda row: row["episodes"].pop(), "episodes: 1 missing"),
-    "picture": (
-        put("traces.0.signals.output", lambda curve: traces.pack(0.99 * traces.unpack(curve))),
-        "traces[0].signals.output: another curve now",
-    ),
     "tuning": (put("controller.tuning.trials", 1), "controller.tuning"),
 }
 
