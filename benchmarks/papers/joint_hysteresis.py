@@ -32,11 +32,11 @@ def loop_path(
     """
     up = np.linspace(-amplitude, amplitude, 81)
     desired = np.concatenate([np.linspace(0.0, amplitude, 41), up[::-1], up])
-    commands, state = [], model.rows.initial(1)
+    commands, (_, state) = [], model.start(np.zeros((1, 1)))
     for angle in desired:
-        command = np.clip(model.rows.inverse(np.array([angle]), state), model.low, model.high)
-        _, state = model.rows.forward(command, state)
-        commands.append(float(command[0]))
+        command = np.clip(model.inverse(np.array([[angle]]), state), model.low, model.high)
+        _, state = model.forward(command, state)
+        commands.append(command.item())
     return desired, plant.rest_angles(np.array(commands))
 
 

@@ -216,7 +216,7 @@ def test_steps_give_the_readings_of_the_replay(name: str) -> None:
 
 @EVERY
 def test_unknown_channel_is_refused(name: str) -> None:
-    with pytest.raises(ValueError, match="there are"):
+    with pytest.raises(ValueError, match="the inputs are"):
         replay_plant(CASES[name][0], {"wind": 1.0})
 
 

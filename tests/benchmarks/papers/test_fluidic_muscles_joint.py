@@ -282,7 +282,10 @@ def test_text_of_the_page_states_the_measured_numbers() -> None:
     assert f"overshoots by {fine.overshoot:.1f} instead of {same.overshoot:.1f} %" in PAGE.flat
     assert f"{fine.rise / best.rise:.2f} instead of {same.rise / best.rise:.2f}" in PAGE.flat
     assert f"rises {step('joint_pi_slow').rise / best.rise:.1f} times faster" in PAGE.flat
-    assert f"{best.overshoot - same.overshoot:.1f} points more than the same PI" in PAGE.flat
+    assert (
+        f"{best.overshoot - same.overshoot:.1f} percentage points more than the same PI"
+        in PAGE.flat
+    )
 
 
 def test_page_has_the_paths_and_those_held_out() -> None:
