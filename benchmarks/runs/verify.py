@@ -1,9 +1,9 @@
 """Verification of rows: validity for the present task and controller, and reproducibility.
 
-Only a row's packages and processor are trusted: environment, scenarios, policy files, salt and the
-set of episodes are those of this checkout, and every number is computed again. A row that states
-other packages or another processor may differ by rounding, and is recorded as verified within
-tolerance.
+Only a row's packages, processor and commit are trusted: environment, scenarios, policy files, salt
+and the set of episodes are those of this checkout, and every number is computed again. A row that
+states others may differ by rounding, and is recorded as verified within tolerance: a controller may
+have been rewritten since with actions that are equal within 1e-6.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ def _compare(stored: Record, again: Record, verdict: Verdict) -> None:
     verdict.notes += differences(_described(before), _described(after), "description")
     curves = list(_other_curves(before.pop("traces"), after.pop("traces")))
     drifted = differences(before, after)
-    if drifted and any(made.get(key) != here.get(key) for key in ("packages", "cpu")):
+    if drifted and any(made.get(key) != here.get(key) for key in ("packages", "cpu", "commit")):
         verdict.mode = verified.ELSEWHERE
         verdict.notes.append(f"{len(drifted)} fields differ in bits, the first: {drifted[0]}")
         drifted = beyond_rounding(before, after)

@@ -175,6 +175,16 @@ def test_forged_entry_is_detected(what: str, forged: Any) -> None:
     assert_drifted(forged(name, change), words)
 
 
+def test_row_of_another_commit_may_differ_by_rounding(forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["made_with"]["commit"] = ZEROS[:40]
+        put(RMS, a_hair_less)(row)
+
+    verdict = forged("integral", change)
+    assert verdict.holds
+    assert verdict.mode == "elsewhere"
+
+
 @pytest.mark.parametrize(("steps", "holds"), [(1, True), (3, False)])
 def test_plotted_curves_may_differ_by_the_step_of_their_grid(
     steps: int, holds: bool, forged: Any
