@@ -112,10 +112,10 @@ def test_missing_workers_are_reported_and_awaited(
         found = run(square, tasks, on(dask))
         done = [next(found)]
         dask.end_workers()
-        told = f"no worker is at {dask.address}; waiting for one"
+        message = f"no worker is at {dask.address}; waiting for one"
 
         def times() -> int:
-            return sum(told in text for text in list(said))
+            return sum(message in text for text in list(said))
 
         def join_again() -> None:
             try:

@@ -70,8 +70,8 @@ def test_third_party_controller_enters_catalogue_checks_and_benchmark(folder):
     check_controller(toy, observations_of(env, steps=8, rows=3), env.action_signals)
     record = rollout(env, toy)
     assert abs(record["output"] - record["reference"]).mean() < abs(record["reference"]).mean()
-    told = (env.plant, env.signals, env.action_signals)
-    assert make_controller("toy_integrator", *told, knobs={"gain": 2.0}).gain == 4e6
+    nominal = (env.plant, env.signals, env.action_signals)
+    assert make_controller("toy_integrator", *nominal, knobs={"gain": 2.0}).gain == 4e6
     assert benchmarked.find("toy_integrator").runs_in("PAM/MusclePositioning-v0")
     with pytest.raises(ValueError, match="'toy_integrator' is registered already"):
         load(folder)
