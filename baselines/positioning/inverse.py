@@ -39,7 +39,8 @@ from baselines.core.controller import (
 )
 from baselines.core.entry import Entry, Spec
 from baselines.core.knobs import Bounds
-from baselines.positioning.nominal import HysteresisState, Nominal
+from baselines.positioning.nominal import Nominal
+from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.parameters import Signal
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
@@ -56,7 +57,7 @@ class InverseState(NamedTuple):
 
     pressure: Array
     drive: Array
-    hysteresis: HysteresisState
+    hysteresis: RowsState
 
 
 @dataclass(frozen=True)
@@ -139,11 +140,11 @@ class Inverse(RowController):
         return InverseState(pressure, drive, hysteresis)
 
 
-def _taken(hysteresis: HysteresisState, rows: Any) -> HysteresisState:
+def _taken(hysteresis: RowsState, rows: Any) -> RowsState:
     return hysteresis if isinstance(rows, slice) else tuple(a[rows] for a in hysteresis)
 
 
-def _placed(whole: Any, part: HysteresisState, rows: Any, n: int) -> HysteresisState:
+def _placed(whole: Any, part: RowsState, rows: Any, n: int) -> RowsState:
     if isinstance(rows, slice):
         return part
     if whole is None:

@@ -21,7 +21,6 @@ from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-HysteresisState = RowsState
 CURVE_POINTS = 1001
 """Points of the tabulated static curve; linear interpolation is exact to 0.05 um."""
 
@@ -61,19 +60,19 @@ class LoadedMuscle:
         """Return the contraction [m] at rest under an effective pressure [Pa]."""
         return np.interp(drive, *self._curve)
 
-    def advance(self, drive: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
+    def advance(self, drive: Array, state: RowsState) -> tuple[Array, RowsState]:
         """Return the effective pressure [Pa] at a pressure [Pa], and the next state."""
         law, full = self.plant.hysteresis, self.plant.regulator.max_pressure
         output, after = self.hysteresis.forward(law.stretched(drive, full), state)
         return law.unstretched(output, full), after
 
-    def pressure_for(self, drive: Array, state: HysteresisState) -> Array:
+    def pressure_for(self, drive: Array, state: RowsState) -> Array:
         """Return the pressure [Pa] for an effective pressure [Pa] at this hysteresis state."""
         law, full = self.plant.hysteresis, self.plant.regulator.max_pressure
         found = self.hysteresis.inverse(law.stretched(drive, full), state)
         return law.unstretched(np.minimum(np.maximum(found, 0.0), full), full)
 
-    def explain(self, contraction: Array, pressure: Array) -> HysteresisState:
+    def explain(self, contraction: Array, pressure: Array) -> RowsState:
         """Return the hysteresis state of the simplest history of a first measurement.
 
         The history rises from zero pressure to a peak and falls to the present pressure. A higher
@@ -89,7 +88,7 @@ class LoadedMuscle:
             low, high = np.where(more, middle, low), np.where(more, high, middle)
         return self._after(low, pressure)[1]
 
-    def _after(self, peak: Array, pressure: Array) -> tuple[Array, HysteresisState]:
+    def _after(self, peak: Array, pressure: Array) -> tuple[Array, RowsState]:
         _, state = self.advance(peak, self.hysteresis.initial(len(peak)))
         return self.advance(pressure, state)
 
