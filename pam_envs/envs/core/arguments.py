@@ -263,7 +263,10 @@ def environments(name: str, make_setup: Callable[..., Setup], *fixed: Any) -> tu
     ``fixed`` are the first arguments of ``make_setup``, which the id of the environment fixes.
     """
     module = make_setup.__module__
-    scope = {"__module__": module, "__doc__": sys.modules[module].__doc__}
-    made = functools.partial(make_setup, *fixed)
-    single = type(f"{name}Env", (PlantEnv,), dict(scope), make_setup=made)
-    return single, type(f"{name}VectorEnv", (PlantVectorEnv,), dict(scope), make_setup=made)
+    scope = {
+        "__module__": module,
+        "__doc__": sys.modules[module].__doc__,
+        "make_setup": staticmethod(functools.partial(make_setup, *fixed)),
+    }
+    single = type(f"{name}Env", (PlantEnv,), dict(scope))
+    return single, type(f"{name}VectorEnv", (PlantVectorEnv,), dict(scope))

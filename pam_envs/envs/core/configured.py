@@ -36,11 +36,6 @@ class Configured:
     control_period: float
     render_mode: str | None
 
-    def __init_subclass__(cls, make_setup: Callable[..., Setup] | None = None) -> None:
-        """Take the function from the class statement."""
-        if make_setup is not None:
-            cls.make_setup = staticmethod(make_setup)
-
     def _configure(self, setup: Setup | None, arguments: Mapping[str, Any]) -> Setup:
         """Set the attributes from a setup, or from that of the arguments."""
         setup = self.make_setup(**arguments) if setup is None else setup
