@@ -249,14 +249,19 @@ def invert_rows(
 
 
 # --- tiles of lanes -----------------------------------------------------------------------------
-# Most inputs continue along the present branch. So its end points are kept in rows of their own,
-# the stack is read only where an input leaves the branch, and the outputs of all lanes are
-# evaluated in one loop without branches. The bits are those of preisach_step.
+# Most inputs continue along the present branch and stay in the present cell of the map. So the
+# branch and the corners of its cell are kept in rows of their own, stack and map are read only
+# where an input leaves them, and the outputs of all lanes are evaluated in one loop without
+# branches or gathered values. The bits are those of preisach_step.
 
-PRESENT, OUTPUT, TURN, TURN_OUTPUT, PART, BOUND = range(2 * DEPTH, 2 * DEPTH + 6)
+(
+    PRESENT, OUTPUT, TURN, TURN_OUTPUT, PART, BOUND, CELL, CORNER, RISE, SHARE, OFFSET, BEND,
+) = range(2 * DEPTH, 2 * DEPTH + 12)  # fmt: skip
 """State rows after stack and sums: present input and output, turn and output that the branch is
-counted from, factor on the map, and the input at which the next loop closes."""
-STATE_ROWS = 2 * DEPTH + 6
+counted from, factor on the map, and the input at which the next loop closes; then the map's cell
+of the present input, its lowest corner, the differences along the input, the position of the turn
+across the cell, the corner's difference across times that, and the difference of differences."""
+STATE_ROWS = 2 * DEPTH + 12
 EVERYTHING = 1e300
 """Bound of a branch that closes no loop."""
 
@@ -267,6 +272,12 @@ def _continues(x: float, present: float, turn: float, bound: float) -> float:
     if present > turn:
         return 1.0 if x >= present and x < bound else 0.0
     return 1.0 if x <= present and x > bound else 0.0
+
+
+@kernel
+def _cell(a: float, last: float) -> float:
+    """Return the cell of an input in cells, the last one included its upper end."""
+    return min(int(a) * 1.0, last)
 
 
 @kernel
@@ -286,17 +297,73 @@ def _bound(n: int, x: float, turn: float, closing: float, start: float, low: flo
 
 @kernel
 def _list_leaving(
-    x: Any, rows: Any, low: Any, high: Any, at: int, leaving: Any, first: int, last: int
-) -> int:
-    """List the lanes whose inputs leave their branches in row 0 of ``leaving``; return how many."""
-    present, turn, bound = rows[at + PRESENT], rows[at + TURN], rows[at + BOUND]
+    x: Any, rows: Any, low: Any, high: Any, inverse_cell: Any, last_cell: float, at: int,
+    leaving: Any, first: int, last: int,
+) -> int:  # fmt: skip
+    """List the lanes whose inputs leave their branches or cells in row 0; return how many.
+
+    Row 1 of ``leaving`` is 1 for a lane that continues along its branch.
+    """
+    present, turn, bound, cell = (
+        rows[at + PRESENT],
+        rows[at + TURN],
+        rows[at + BOUND],
+        rows[at + CELL],
+    )
+    staying = 0
     for j in range(first, last):
-        leaving[1][j] = _continues(_held(x[j], low[j], high[j]), present[j], turn[j], bound[j])
+        held = _held(x[j], low[j], high[j])
+        leaving[1][j] = _continues(held, present[j], turn[j], bound[j])
+        same = 1.0 if _cell((held - low[j]) * inverse_cell[j], last_cell) == cell[j] else 0.0
+        leaving[2][j] = leaving[1][j] * same
+        staying = staying + int(leaving[2][j])
+    if staying == last - first:
+        return 0
     number = 0
     for j in range(first, last):
         leaving[0][number] = j
-        number = number + (1 - int(leaving[1][j]))
+        number = number + (1 - int(leaving[2][j]))
     return number
+
+
+@kernel
+def _enter(x: float, rows: Any, counts: Any, at: int, count: int, j: int, low: float) -> None:
+    """Move one lane from its present branch to that of the input ``x``."""
+    stack, sums, points = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH], counts[count]
+    now = points[j] - 1
+    stack[now][j], sums[now][j] = rows[at + PRESENT][j], rows[at + OUTPUT][j]
+    n, turn, output, part = _find_turn(x, stack, sums, points, j, low)
+    rows[at + TURN][j], rows[at + TURN_OUTPUT][j], rows[at + PART][j] = turn, output, part
+    rows[at + BOUND][j] = _bound(n, x, turn, stack[max(n - 2, 0)][j], stack[0][j], low)
+    stack[n][j] = x
+    points[j] = n + 1
+
+
+@kernel
+def _enter_cell(x: float, rows: Any, at: int, j: int, table: Any, low: float, per: float) -> None:
+    """Keep the corners of the map's cell of the input ``x`` and of the branch's turn."""
+    b = (rows[at + TURN][j] - low) * per
+    i, k = int(_cell((x - low) * per, len(table) - 2.0)), int(_cell(b, len(table) - 2.0))
+    e00, e01, e10, e11 = table[i][k], table[i][k + 1], table[i + 1][k], table[i + 1][k + 1]
+    share = b - k
+    rows[at + CELL][j], rows[at + CORNER][j], rows[at + RISE][j] = i * 1.0, e00, e10 - e00
+    rows[at + SHARE][j], rows[at + OFFSET][j] = share, share * (e01 - e00)
+    rows[at + BEND][j] = (e00 + e11) - (e10 + e01)
+
+
+@kernel
+def _follow(
+    x: Any, y: Any, rows: Any, low: Any, high: Any, inverse_cell: Any, at: int, first: int,
+    last: int,
+) -> None:  # fmt: skip
+    """Write the outputs on the present branches and in the present cells."""
+    turn_output, part, cell = rows[at + TURN_OUTPUT], rows[at + PART], rows[at + CELL]
+    corner, rise, share = rows[at + CORNER], rows[at + RISE], rows[at + SHARE]
+    offset, bend = rows[at + OFFSET], rows[at + BEND]
+    for j in range(first, last):
+        s = (_held(x[j], low[j], high[j]) - low[j]) * inverse_cell[j] - cell[j]
+        change = corner[j] + (s * rise[j] + offset[j]) + s * share[j] * bend[j]
+        y[j] = turn_output[j] + part[j] * change
 
 
 @kernel
@@ -306,24 +373,18 @@ def relays_step(
 ) -> None:  # fmt: skip
     """Advance the extrema of a tile (:class:`~pam_envs.hysteresis.protocol.Kernels`)."""
     low, inverse_cell, high = fixed[model + LOW], fixed[model + INVERSE_CELL], fixed[model + HIGH]
-    present, output, turn = rows[at + PRESENT], rows[at + OUTPUT], rows[at + TURN]
-    turn_output, part, bound = rows[at + TURN_OUTPUT], rows[at + PART], rows[at + BOUND]
-    stack, sums, points = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH], counts[count]
-    members, leaving = counts[member], scratch(2, LANES)
-    for q in range(_list_leaving(x, rows, low, high, at, leaving, first, last)):
+    leaving, last_cell = scratch(3, LANES), len(table[0]) - 2.0
+    present, output, members = rows[at + PRESENT], rows[at + OUTPUT], counts[member]
+    number = _list_leaving(x, rows, low, high, inverse_cell, last_cell, at, leaving, first, last)
+    for q in range(number):
         j = int(leaving[0][q])
-        held, now = _held(x[j], low[j], high[j]), points[j] - 1
-        stack[now][j], sums[now][j] = present[j], output[j]
-        n, turn[j], turn_output[j], part[j] = _find_turn(held, stack, sums, points, j, low[j])
-        closing, start = stack[max(n - 2, 0)][j], stack[0][j]
-        bound[j] = _bound(n, held, turn[j], closing, start, low[j])
-        stack[n][j] = held
-        points[j] = n + 1
+        held = _held(x[j], low[j], high[j])
+        if leaving[1][j] == 0.0:
+            _enter(held, rows, counts, at, count, j, low[j])
+        _enter_cell(held, rows, at, j, table[members[j]], low[j], inverse_cell[j])
+    _follow(x, output, rows, low, high, inverse_cell, at, first, last)
     for j in range(first, last):
-        held, own = _held(x[j], low[j], high[j]), table[members[j]]
-        a, b = (held - low[j]) * inverse_cell[j], (turn[j] - low[j]) * inverse_cell[j]
-        found = turn_output[j] + part[j] * everett(a, b, own)
-        present[j], output[j], y[j] = held, found, found
+        y[j], present[j] = output[j], _held(x[j], low[j], high[j])
 
 
 @kernel
@@ -333,29 +394,29 @@ def relays_peek(
     last: int,
 ) -> None:  # fmt: skip
     """Write the lags at inputs, and their growth since the states were last moved."""
+    leaving, last_cell, members = scratch(3, LANES), len(table[0]) - 2.0, counts[member]
+    low, inverse_cell, high = fixed[model + LOW], fixed[model + INVERSE_CELL], fixed[model + HIGH]
     for m in range(operators):
         at = state + m * STATE_ROWS
         x, lag, stick = rows[x_at + m], rows[lag_at + m], rows[stick_at + m]
-        low, high = fixed[model + LOW], fixed[model + HIGH]
-        inverse_cell = fixed[model + INVERSE_CELL]
-        present, output, turn = rows[at + PRESENT], rows[at + OUTPUT], rows[at + TURN]
-        turn_output, part = rows[at + TURN_OUTPUT], rows[at + PART]
+        present, output = rows[at + PRESENT], rows[at + OUTPUT]
         stack, sums = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH]
         points = counts[count + m]
-        members, leaving, branch = counts[member], scratch(2, LANES), scratch(3, LANES)
-        for j in range(first, last):
-            branch[0][j], branch[1][j], branch[2][j] = turn[j], turn_output[j], part[j]
-        for q in range(_list_leaving(x, rows, low, high, at, leaving, first, last)):
+        _follow(x, lag, rows, low, high, inverse_cell, at, first, last)
+        number = _list_leaving(
+            x, rows, low, high, inverse_cell, last_cell, at, leaving, first, last
+        )
+        for q in range(number):
             j = int(leaving[0][q])
             held, now = _held(x[j], low[j], high[j]), points[j] - 1
-            stack[now][j], sums[now][j] = present[j], output[j]
-            _, branch[0][j], branch[1][j], branch[2][j] = _find_turn(
-                held, stack, sums, points, j, low[j]
-            )
+            turn, start, part = rows[at + TURN][j], rows[at + TURN_OUTPUT][j], rows[at + PART][j]
+            if leaving[1][j] == 0.0:
+                stack[now][j], sums[now][j] = present[j], output[j]
+                _, turn, start, part = _find_turn(held, stack, sums, points, j, low[j])
+            a, b = (held - low[j]) * inverse_cell[j], (turn - low[j]) * inverse_cell[j]
+            lag[j] = start + part * everett(a, b, table[members[j]])
         for j in range(first, last):
-            held, own = _held(x[j], low[j], high[j]), table[members[j]]
-            a, b = (held - low[j]) * inverse_cell[j], (branch[0][j] - low[j]) * inverse_cell[j]
-            found = branch[1][j] + branch[2][j] * everett(a, b, own)
+            found = lag[j]
             lag[j] = x[j] - found
             stick[j] = growth(x[j] - found - (present[j] - output[j]), x[j] - present[j])
 
@@ -377,5 +438,5 @@ def relays_begin(
     bottom, output = fixed[model + BOTTOM][j], fixed[model + START_OUTPUT][j]
     rows[at][j], rows[at + DEPTH][j] = bottom, output
     rows[at + PRESENT][j] = rows[at + TURN][j] = rows[at + BOUND][j] = bottom
-    rows[at + OUTPUT][j] = output
+    rows[at + OUTPUT][j], rows[at + CELL][j] = output, -1.0
     counts[count][j] = 1
