@@ -18,7 +18,7 @@ GROUPS: dict[str, tuple[Probe, ...]] = {
     "single": (probes.single, probes.single_joints),
     "batch": (probes.batch, probes.variants, probes.growth, probes.cores, probes.processes),
     "planning": (probes.planning,),
-    "plain": (probes.uncompiled, probes.jacobian),
+    "plain": (probes.uncompiled,),
     "start": (probes.start_up,),
     "learning": (learning, shares),
     "diagnosis": (diagnosing,),

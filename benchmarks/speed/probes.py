@@ -311,24 +311,6 @@ def uncompiled(rounds: int) -> list[Measurement]:
     ]
 
 
-def jacobian(rounds: int) -> list[Measurement]:
-    """Jacobian of a 60 s record over all free parameters."""
-    from pam_envs.identification import record_jacobian as fit
-    from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-    plant = SingleMuscle.mas10()
-    names = (*fit.FREE, *fit.weights(plant))
-    set_points = np.repeat(np.random.default_rng(0).uniform(0.0, 6e5, 60), 100)
-    fit.jacobian(plant, set_points, names)  # compiles
-    spent = []
-    for _ in range(rounds):
-        begin = time.process_time()
-        fit.jacobian(plant, set_points, names)
-        spent.append(1e3 * (time.process_time() - begin))
-    title = f"Jacobian of a 60 s record, {len(names)} parameters"
-    return [Measurement("plain", title, median(spent), "ms", 150.0, 20.0, "less")]
-
-
 # --- start-up -------------------------------------------------------------------------------------
 
 _START = """

@@ -40,7 +40,7 @@ from scipy.linalg import null_space
 from scipy.optimize import linprog
 
 from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
-from pam_envs.identification.hysteresis_loops import measured
+from pam_envs.identification.preisach_forc import measured
 
 Array = NDArray[np.float64]
 Loop = tuple[ArrayLike, ArrayLike]

@@ -27,7 +27,6 @@ from pam_envs.hysteresis import everett as maps
 from pam_envs.hysteresis.extrema import preisach_step
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import Start
-from pam_envs.identification.hysteresis_loops import measured
 from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
@@ -136,6 +135,21 @@ def curve_inputs(low: float, high: float, levels: int, points: int = 1) -> Array
         up = fine[1 : k * points + 1]
         legs += [up, up[-2::-1], fine[:1]]
     return np.concatenate(legs)
+
+
+def measured(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+    """Return a record as two float arrays, or say what is wrong with it."""
+    inputs, outputs = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    if inputs.ndim != 1 or inputs.shape != outputs.shape or inputs.size < 2:
+        raise ValueError(
+            f"x has shape {inputs.shape} and y {outputs.shape}; give two series of one length,"
+            " at least 2 samples"
+        )
+    for name, values in (("x", inputs), ("y", outputs)):
+        if not np.all(np.isfinite(values)):
+            t = int(np.argmin(np.isfinite(values)))
+            raise ValueError(f"{name}[{t}] is {values[t]}; it must be finite: cut or fill the gap")
+    return inputs, outputs
 
 
 def descending_curves(x: ArrayLike, y: ArrayLike) -> list[tuple[Array, Array]]:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pam_envs.hysteresis import MaxwellSlip, PlayOperator, Preisach, symmetry_error
-from pam_envs.identification.hysteresis_loops import fit_maxwell_slip, fit_play
+from pam_envs.hysteresis import PlayOperator, Preisach, symmetry_error
 from pam_envs.identification.preisach_forc import (
     congruency_error,
     curve_inputs,
@@ -22,98 +19,8 @@ from pam_envs.identification.preisach_forc import (
 )
 
 Array = NDArray[np.float64]
-LADDER = (0.2, 0.5, 0.9, 1.4)
 
 few = settings(max_examples=40, deadline=None)
-weights_ = st.lists(st.floats(0.05, 2.0), min_size=4, max_size=4)
-
-
-def shrinking_loops(amplitude: float = 2.0, turns: int = 24, points: int = 25) -> Array:
-    """Return an input that swings ever less: it separates all thresholds below its amplitude."""
-    ends = [0.0] + [amplitude * (-1) ** k * (1.0 - k / turns) for k in range(turns)]
-    return np.concatenate([np.linspace(a, b, points) for a, b in pairwise(ends)])
-
-
-# --- plays and stops ------------------------------------------------------------------------------
-
-
-@few
-@given(weights_, st.floats(0.0, 2.0), st.floats(-1.0, 1.0), st.booleans())
-def test_known_weights_are_recovered(weights, line, constant, play):
-    x, line = shrinking_loops(), line if play else max(line, 0.05)
-    if play:
-        y, _ = PlayOperator(LADDER, tuple(weights), line).simulate(x)
-        fit = fit_play(x, y + constant, LADDER)
-        found, slope = fit.model.weights, fit.model.linear
-    else:
-        y, _ = MaxwellSlip(line, tuple(weights), LADDER).simulate(x)
-        fit = fit_maxwell_slip(x, y + constant, LADDER)
-        found, slope = fit.model.stiffnesses, fit.model.spring
-    assert fit.determined
-    assert fit.rank == 6
-    np.testing.assert_allclose(found, weights, atol=1e-8)
-    assert slope == pytest.approx(line, abs=1e-8)
-    assert fit.offset == pytest.approx(constant, abs=1e-8)
-    assert fit.rms < 1e-10
-
-
-def test_state_before_the_record_may_be_given():
-    model = PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4)
-    _, state = model.simulate([1.9, -1.2])
-    x = shrinking_loops()
-    y, _ = model.simulate(x, state)
-    fit = fit_play(x, y, LADDER, initial_state=state)
-    np.testing.assert_allclose(fit.model.weights, model.weights, atol=1e-8)
-    assert fit_play(x, y, LADDER).rms > 1e-3  # the virgin state does not explain it
-
-
-def standard_errors(x: Array, sigma: float) -> Array:
-    """Return the standard deviations of the least-squares weights of line and plays."""
-    columns = [x] + [PlayOperator((r,), (1.0,), 0.0).simulate(x)[0] for r in LADDER]
-    design = np.column_stack([*columns, np.ones_like(x)])
-    return sigma * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-
-
-def test_noise_gives_the_errors_predicted_by_least_squares():
-    model, x, sigma = PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4), shrinking_loops(), 0.01
-    y, _ = model.simulate(x)
-    truth = np.array([model.linear, *model.weights])
-    allowed = 4.5 * standard_errors(x, sigma)[:-1]
-    for seed in range(20):
-        noise = sigma * np.random.default_rng(seed).standard_normal(len(x))
-        fit = fit_play(x, y + noise, LADDER)
-        found = np.array([fit.model.linear, *fit.model.weights])
-        assert np.all(np.abs(found - truth) <= allowed)
-        assert np.max(np.abs(found - truth)) < 0.02
-        assert fit.rms == pytest.approx(sigma, rel=0.1)
-
-
-def test_weights_are_never_negative():
-    x = shrinking_loops()
-    noise = np.random.default_rng(0).standard_normal(len(x))
-    for fit in (fit_play(x, noise), fit_maxwell_slip(x, noise)):
-        model = fit.model
-        sizes = model.weights if isinstance(model, PlayOperator) else model.stiffnesses
-        assert min(sizes) >= 0.0
-
-
-def test_rank_falls_for_a_small_loop():
-    model = PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4)
-    x = shrinking_loops(amplitude=0.7)
-    fit = fit_play(x, model.simulate(x)[0], LADDER)
-    assert (fit.rank, fit.unknowns) == (4, 6)  # thresholds of 0.9 and 1.4 never move
-    assert not fit.determined
-    assert fit.model.weights[2:] == (0.0, 0.0)
-    np.testing.assert_allclose(fit.model.weights[:2], model.weights[:2], atol=1e-8)
-
-
-def test_ladder_by_default_covers_the_record():
-    x = shrinking_loops()
-    fit = fit_play(x, PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4).simulate(x)[0], elements=12)
-    assert len(fit.model.thresholds) == 12
-    assert fit.model.thresholds[0] > 0.0
-    assert fit.model.thresholds[-1] < 2.0
-    assert fit.rms < 0.02
 
 
 # --- first-order curves ---------------------------------------------------------------------------
@@ -266,12 +173,8 @@ def curves(x, levels):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: fit_play(UP, [0.0]), r"shape \(2,\) and y \(1,\)"),
-        (lambda: fit_play([0.0, np.nan, 1.0], [0.0, 1.0, 2.0]), r"x\[1\] is nan.*finite"),
-        (lambda: fit_play([1.0, 1.0], UP), r"does not vary.*thresholds"),
-        (lambda: fit_play(UP, UP, [0.5, 0.2]), r"thresholds\[1\] is 0.2.*sort"),
-        (lambda: fit_play(UP, UP, elements=0), r"elements is 0.*at least 1"),
-        (lambda: fit_play(UP, UP, [0.5], initial_state=UP), r"initial_state has shape \(2,\)"),
+        (lambda: fit_preisach(UP, [0.0], -1.0, 1.0), r"shape \(2,\) and y \(1,\)"),
+        (lambda: congruency_error([(UP, [np.nan, 1.0])]), r"y\[0\] is nan.*finite"),
         (lambda: curves([1.0, -1.0], 3), r"no curve turns at 0.0.*fit_preisach"),
         (lambda: curves(UP[::-1], 2), r"ends at 0.0.*reach -1.0"),
         (lambda: fit_preisach(UP, UP, -1.0, 1.0, prior_weight=0.0), r"prior_weight is 0.*above 0"),

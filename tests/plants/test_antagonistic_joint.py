@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.identification.joint_static import fit_angle_plays
 from pam_envs.plants.antagonistic_joint.hysteresis import contraction_plays, joint_hysteresis
 from pam_envs.plants.antagonistic_joint.pair import feed_forward
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -212,11 +213,19 @@ def test_friction_is_at_most_the_data_sheets_hysteresis() -> None:
 
 
 def test_the_reduced_hysteresis_is_identified_on_the_plant_with_muscles() -> None:
-    found, error = fit_angle_plays(AntagonisticJoint.paper())
+    phase, turns = np.linspace(0.0, 4.0 * np.pi, 121)[1:], np.random.default_rng(0)
+    loops = [np.radians(a) * np.sin(phase) for a in (25.0, 20.0, 15.0, 10.0, 7.0, 5.0, 3.0)]
+    ends = np.radians([0.0, *turns.uniform(-25.0, 25.0, 40)])
+    commands = np.concatenate([*loops, *(np.linspace(*e, 13)[1:] for e in pairwise(ends))])
     made = joint_hysteresis("maxwell_slip", True).operator
     assert isinstance(made, PlayOperator)
-    assert np.allclose(found.weights, made.weights, atol=1e-3)
-    assert math.degrees(error) < 0.17
+    stops = [
+        commands - PlayOperator((r,), (1.0,), 0.0).simulate(commands)[0] for r in made.thresholds
+    ]
+    behind = commands - AntagonisticJoint.paper().rest_angles(commands)
+    weights, norm = nnls(np.column_stack(stops), behind)
+    assert np.allclose(weights, made.weights, atol=1e-3)
+    assert math.degrees(norm / np.sqrt(len(commands))) < 0.17
 
 
 # --- files, rows, bad values ---------------------------------------------------------------------
