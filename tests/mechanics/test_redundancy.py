@@ -9,14 +9,16 @@ import pytest
 
 from pam_envs.kernels.build import interpreted
 from pam_envs.mechanics.redundancy import resolution as redundancy
-from pam_envs.mechanics.redundancy.equations import (
+from pam_envs.mechanics.redundancy.newton import (
     across,
+    bends_upwards,
+    resolve_path,
     set_curvature,
     set_equations,
     slope_and_curvature,
+    solve_equations,
     weight_of,
 )
-from pam_envs.mechanics.redundancy.newton import bends_upwards, resolve_path, solve_equations
 from pam_envs.mechanics.redundancy.resolution import (
     LIMIT,
     Resolution,
@@ -25,7 +27,7 @@ from pam_envs.mechanics.redundancy.resolution import (
     resolve,
 )
 from pam_envs.mechanics.serial_chain.chain import SerialChain
-from pam_envs.mechanics.serial_chain.rows import work_rows
+from pam_envs.mechanics.serial_chain.kernels import work_rows
 from pam_envs.references.path import joint_line
 
 ARM = SerialChain.uniform()

@@ -11,11 +11,12 @@ import pytest
 from pam_envs.constants import GRAVITY
 from pam_envs.kernels.build import COMPILED, build, interpreted, kernel
 from pam_envs.mechanics.serial_chain.chain import FORM, SerialChain
-from pam_envs.mechanics.serial_chain.dynamics import chain_solve, chain_terms
-from pam_envs.mechanics.serial_chain.kinematics import place_chain
-from pam_envs.mechanics.serial_chain.rows import (
+from pam_envs.mechanics.serial_chain.kernels import (
+    chain_solve,
+    chain_terms,
     mass_row,
     parameter_rows,
+    place_chain,
     pointing_row,
     tip_row,
     work_rows,

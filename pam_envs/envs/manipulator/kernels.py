@@ -24,8 +24,14 @@ from pam_envs.envs.core.step import CHANNELS, CHOICE, FIRST_INFO, N_INFO, PERIOD
 from pam_envs.envs.manipulator import layout as L
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
-from pam_envs.mechanics.serial_chain.kinematics import N_STAGES, place_chain
-from pam_envs.mechanics.serial_chain.rows import DIRECTION, POINT, block, parameter_rows
+from pam_envs.mechanics.serial_chain.kernels import (
+    DIRECTION,
+    N_STAGES,
+    POINT,
+    block,
+    parameter_rows,
+    place_chain,
+)
 from pam_envs.plants.antagonistic_joint.pair import command
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.step import (

@@ -1,5 +1,16 @@
 """Newton's method on the Lagrangian of a redundant chain, pose after pose of a path.
 
+The equations of an iteration are fluidic_muscles, (2.2) to (2.12), with two corrections: the second
+derivative of the Lagrangian holds the curvature of the constraint, ``sum_i lambda_i d2 g_i / dq2``,
+which the text leaves to the reader, and the upper right block is ``dF_1 / d lambda = J_g'`` and not
+(2.9)'s ``dF_2 / d lambda``:
+
+    [ d2 f + sum_i lambda_i d2 g_i   J_g' ] [ dq       ]     [ df       ]
+    [ J_g                            0    ] [ lambda + ] = - [ g(q) - x ]
+
+The five equations of a pose are the three of its position and, of its direction, the two components
+across the desired one. All rows have one lane: ``LANES = 1``.
+
 The pose is not a linear function of the angles, so the problem is not convex (fluidic_muscles says
 it is): the method needs a start nearby, steps that stay between the limits, and an arm that is not
 straight, where the Jacobian loses rank. Each pose starts from the solution of the one before; at
@@ -8,19 +19,27 @@ the beginning of a path, and where that fails, bent poses are tried.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+from pam_envs.kernels.arithmetic import log_of_fraction
 from pam_envs.kernels.build import kernel, routine
-from pam_envs.mechanics.redundancy.equations import (
-    TASK,
-    merit,
-    set_curvature,
-    set_equations,
-    weight_of,
+from pam_envs.mechanics.serial_chain.kernels import (
+    AXIS,
+    DIRECTION,
+    GRAVITY_ROWS,
+    LEVER,
+    LINK_ROWS,
+    N_STAGES,
+    POINT,
+    block,
+    cross,
+    place_chain,
+    vector,
 )
-from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
-from pam_envs.mechanics.serial_chain.rows import GRAVITY_ROWS, LINK_ROWS
 
+TASK = 5
+"""Degrees of freedom of a pose."""
 MOST_ITERATIONS = 150
 TOLERANCE = 1e-10
 """Largest change of an angle [rad] in the last iteration."""
@@ -44,6 +63,147 @@ MUCH = 1e7
 SMALLEST_PIVOT = 1e-13
 SMALLEST_ROOM = 1e-9
 """Least distance from a limit, as a share of it."""
+
+
+@kernel
+def across(dx: float, dy: float, dz: float) -> tuple[float, float, float]:
+    """Return a unit vector across another one."""
+    if abs(dx) <= abs(dy) and abs(dx) <= abs(dz):
+        tx, ty, tz = cross(dx, dy, dz, 1.0, 0.0, 0.0)
+    elif abs(dy) <= abs(dz):
+        tx, ty, tz = cross(dx, dy, dz, 0.0, 1.0, 0.0)
+    else:
+        tx, ty, tz = cross(dx, dy, dz, 0.0, 0.0, 1.0)
+    size = math.sqrt(tx * tx + ty * ty + tz * tz)
+    return tx / size, ty / size, tz / size
+
+
+@kernel
+def slope_and_curvature(angle: float, limit: float, weighted: bool) -> tuple[float, float]:
+    """Return both derivatives of the weight (2.1) of one joint, or of the square of its angle.
+
+    ``4 q^2 - ln(1 - z)`` with ``z = (q / limit)^2``: curvature ``8 + (2 / limit^2) (1 + z) /
+    (1 - z)^2``.
+    """
+    if not weighted:
+        return 2.0 * angle, 2.0
+    share = angle / limit
+    rest = 1.0 - share * share
+    slope = 8.0 * angle + 2.0 * share / (limit * rest)
+    return slope, 8.0 + 2.0 * (1.0 + share * share) / (limit * limit * rest * rest)
+
+
+@kernel
+def weight_of(q: Any, limit: float, weighted: bool) -> float:
+    """Return the weight (2.1) of all joints, or the sum of the squares of their angles."""
+    total = 0.0
+    for k in range(N_STAGES):
+        angle = q[k][0]
+        if weighted:
+            share = angle / limit
+            total = total + 4.0 * angle * angle - log_of_fraction(1.0 - share * share)
+        else:
+            total = total + angle * angle
+    return total
+
+
+@kernel
+def column(work: Any, k: int) -> tuple[float, float, float, float, float, float]:
+    """Return the rates of tip and direction per rate of joint ``k``."""
+    at, end = block(0, N_STAGES, k + 1), block(0, N_STAGES, N_STAGES)
+    ax, ay, az = vector(work, at + AXIS, 0)
+    px, py, pz = vector(work, end + POINT, 0)
+    dx, dy, dz = vector(work, end + DIRECTION, 0)
+    vx, vy, vz = cross(ax, ay, az, px, py, pz)
+    wx, wy, wz = cross(ax, ay, az, dx, dy, dz)
+    lever = at + LEVER
+    return vx + work[lever][0], vy + work[lever + 1][0], vz + work[lever + 2][0], wx, wy, wz
+
+
+@kernel
+def sides(pose: Any) -> tuple[float, float, float, float, float, float]:
+    """Return two unit vectors across the desired direction."""
+    sx, sy, sz = across(pose[3], pose[4], pose[5])
+    tx, ty, tz = cross(pose[3], pose[4], pose[5], sx, sy, sz)
+    return sx, sy, sz, tx, ty, tz
+
+
+@kernel
+def errors_of(work: Any, pose: Any) -> tuple[float, float, float, float, float]:
+    """Return the errors of position [m] and of direction, across the desired one."""
+    end = block(0, N_STAGES, N_STAGES)
+    dx, dy, dz = vector(work, end + DIRECTION, 0)
+    sx, sy, sz, tx, ty, tz = sides(pose)
+    return (
+        work[end + POINT][0] - pose[0],
+        work[end + POINT + 1][0] - pose[1],
+        work[end + POINT + 2][0] - pose[2],
+        sx * dx + sy * dy + sz * dz,
+        tx * dx + ty * dy + tz * dz,
+    )
+
+
+@routine
+def set_equations(
+    q: Any, fixed: Any, work: Any, system: Any, pose: Any, limit: float, weighted: bool
+) -> float:
+    """Write the equations of an iteration without the constraint's curvature.
+
+    The matrix is ``system[row][column]``, its last column the right-hand side. Returns the
+    largest error of the pose, at least 1 where it points the other way.
+    """
+    n, last = N_STAGES, N_STAGES + TASK
+    place_chain(q, fixed, work, 0, 0, 0)
+    sx, sy, sz, tx, ty, tz = sides(pose)
+    for i in range(last):
+        for k in range(last + 1):
+            system[i][k] = 0.0
+    for k in range(n):
+        vx, vy, vz, wx, wy, wz = column(work, k)
+        slope, curvature = slope_and_curvature(q[k][0], limit, weighted)
+        system[k][k], system[k][last] = curvature, -slope
+        values = (vx, vy, vz, sx * wx + sy * wy + sz * wz, tx * wx + ty * wy + tz * wz)
+        for r in range(TASK):
+            system[n + r][k] = system[k][n + r] = values[r]
+    dx, dy, dz = vector(work, block(0, n, n) + DIRECTION, 0)
+    largest = 0.0 if dx * pose[3] + dy * pose[4] + dz * pose[5] > 0.0 else 1.0
+    errors = errors_of(work, pose)
+    for r in range(TASK):
+        system[n + r][last] = -errors[r]
+        largest = max(largest, abs(errors[r]))
+    return largest
+
+
+@routine
+def set_curvature(multipliers: Any, work: Any, system: Any, pose: Any) -> None:
+    """Add the constraint's curvature to the equations."""
+    sx, sy, sz, tx, ty, tz = sides(pose)
+    s, t = multipliers[3], multipliers[4]
+    mx, my, mz = s * sx + t * tx, s * sy + t * ty, s * sz + t * tz
+    lx, ly, lz = multipliers[0], multipliers[1], multipliers[2]
+    for k in range(N_STAGES):
+        vx, vy, vz, wx, wy, wz = column(work, k)
+        cx, cy, cz = cross(vx, vy, vz, lx, ly, lz)
+        ux, uy, uz = cross(wx, wy, wz, mx, my, mz)
+        cx, cy, cz = cx + ux, cy + uy, cz + uz
+        for i in range(k + 1):
+            on = block(0, N_STAGES, i + 1) + AXIS
+            value = work[on][0] * cx + work[on + 1][0] * cy + work[on + 2][0] * cz
+            system[k][i] = system[k][i] + value
+            if i < k:
+                system[i][k] = system[k][i]
+
+
+@routine
+def merit(
+    q: Any, fixed: Any, work: Any, pose: Any, limit: float, weighted: bool, penalty: float
+) -> float:
+    """Return the weight of all joints and a penalty on the errors of the pose."""
+    place_chain(q, fixed, work, 0, 0, 0)
+    total = weight_of(q, limit, weighted)
+    for error in errors_of(work, pose):
+        total = total + penalty * abs(error)
+    return total
 
 
 @routine

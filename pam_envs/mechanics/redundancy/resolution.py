@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import COMPILED, build
-from pam_envs.mechanics.redundancy.equations import TASK
-from pam_envs.mechanics.redundancy.newton import resolve_path
+from pam_envs.mechanics.redundancy.newton import TASK, resolve_path
 from pam_envs.mechanics.serial_chain.chain import SerialChain
-from pam_envs.mechanics.serial_chain.rows import work_rows
+from pam_envs.mechanics.serial_chain.kernels import work_rows
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import COMPILED, LANES, kernel
-from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
-from pam_envs.mechanics.serial_chain.rows import parameter_rows
+from pam_envs.mechanics.serial_chain.kernels import N_STAGES, parameter_rows
 from pam_envs.plants.antagonistic_joint.pair import command
 from pam_envs.plants.core.rollout import Loop, loop_for, run
 from pam_envs.plants.core.rows import signal_rows

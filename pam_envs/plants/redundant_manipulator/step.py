@@ -19,18 +19,19 @@ from typing import Any
 
 from pam_envs.hysteresis import protocol
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.mechanics.serial_chain.dynamics import chain_solve, chain_terms
-from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
-from pam_envs.mechanics.serial_chain.rows import (
+from pam_envs.mechanics.serial_chain.kernels import (
     CENTRE,
     GRAVITY_ROWS,
     LENGTH,
     LINK_ROWS,
     MASS,
+    N_STAGES,
     TURN_X,
+    chain_solve,
+    chain_terms,
     mass_row,
 )
-from pam_envs.mechanics.serial_chain.rows import work_rows as chain_work_rows
+from pam_envs.mechanics.serial_chain.kernels import work_rows as chain_work_rows
 from pam_envs.plants.antagonistic_joint.effects import pair_kernels
 from pam_envs.plants.antagonistic_joint.pair import (
     PAIR,
