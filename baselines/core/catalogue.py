@@ -11,7 +11,7 @@ model knowledge is part of its result. For "nominal model" the caller provides t
 the simulated plant itself without randomisation, the controller knows the true model, and a table
 of results should report it.
 
-Numbers that neither a rule nor a paper fixes are *knobs* (:mod:`baselines.core.knobs`). Names with
+Numbers that neither a rule nor a paper fixes are *knobs* (:mod:`baselines.core.entry`). Names with
 ``_tuned`` are controllers with knobs from a search (:mod:`baselines.core.tuned`).
 """
 
@@ -28,8 +28,7 @@ from typing import Any
 import baselines
 from baselines.core import tuned
 from baselines.core.controller import Controller
-from baselines.core.entry import Entry, Spec
-from baselines.core.knobs import AS_DESIGNED, Knobs, check_knobs
+from baselines.core.entry import AS_DESIGNED, Entry, Knobs, Spec, check_knobs
 from pam_envs.parameters import Signals
 from pam_envs.wording import near
 

@@ -1,16 +1,46 @@
-"""Catalogue entry of a controller, and the specification for its design."""
+"""Catalogue entry of a controller, the specification for its design, and its knobs.
+
+A rule or a paper fixes most parameters of a controller from the nominal plant, and leaves some
+free, such as the bandwidth of the closed loop or the lead of the preview. A *knob* is a factor on
+one of them; a factor of 1 gives the published or rule-based value to the last bit. An entry of the
+catalogue declares its knobs with their bounds (``Entry.knobs``); makers read them by ``Spec.knob``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, Generic, Literal, TypeVar
 
-from baselines.core.environments import POSITIONING
-from baselines.core.knobs import Bounds, Knobs
 from pam_envs.parameters import Signals
 
 P = TypeVar("P")
+POSITIONING = ("PAM/MusclePositioning-v0",)
+BRACE = ("PAM/KneeTension-v0", "PAM/KneeStiffness-v0")
+GAIT = ("PAM/KneeWalk-v0", "PAM/KneeStairsUp-v0", "PAM/KneeStairsDown-v0")
+KNEE = (*BRACE, *GAIT)
+ELBOW = ("PAM/ElbowOrthosis-v0",)
+ARM = ("PAM/RedundantManipulator-v0",)
+JOINT = ("PAM/AntagonisticJoint-v0", *ARM)
+
+SUFFIXES: Mapping[str, str] = {
+    "PAM/KneeTension-v0": "tension",
+    "PAM/KneeStiffness-v0": "stiffness",
+    "PAM/KneeWalk-v0": "walk",
+    "PAM/KneeStairsUp-v0": "stairs_up",
+    "PAM/KneeStairsDown-v0": "stairs_down",
+    "PAM/AntagonisticJoint-v0": "joint",
+    "PAM/RedundantManipulator-v0": "arm",
+}
+"""Suffix of a tuned controller's name, for controllers that run in several environments."""
+
+Knobs = Mapping[str, float]
+Bounds = Mapping[str, tuple[float, float]]
+"""Lowest and highest value by knob; 1 lies between them."""
+
+AS_DESIGNED: Knobs = MappingProxyType({})
+
 Knowledge = Literal["nothing", "tables", "nominal model", "true model"]
 
 
@@ -75,7 +105,7 @@ class Entry:
     trials : int
         Number of settings tried in simulation to choose them.
     knobs : mapping
-        Lowest and highest factor of each knob; see :mod:`baselines.core.knobs`.
+        Lowest and highest factor of each knob; see the module.
     found : mapping
         Factors found by a search; see :mod:`baselines.core.tuned`.
     author : str
@@ -97,3 +127,17 @@ class Entry:
     knobs: Bounds = field(default_factory=dict, hash=False)
     found: Knobs = field(default_factory=dict, hash=False)
     author: str = ""
+
+
+def check_knobs(controller: str, bounds: Bounds, knobs: Knobs) -> None:
+    """Raise unless a controller has these knobs and every factor is within its bounds."""
+    for name, value in knobs.items():
+        if name not in bounds:
+            there = f"choose from {', '.join(bounds)}" if bounds else "it has none: leave knobs out"
+            raise ValueError(f"{controller} has no knob {name!r}; {there}")
+        low, high = bounds[name]
+        if not low <= value <= high:
+            raise ValueError(
+                f"{controller}: knob {name} is {value!r}, outside {low:g} to {high:g}; "
+                "give a factor in that range, 1 for the number as designed"
+            )

@@ -14,9 +14,7 @@ from typing import Any
 
 import yaml
 
-from baselines.core.entry import Entry
-from baselines.core.environments import SUFFIXES
-from baselines.core.knobs import Knobs, check_knobs
+from baselines.core.entry import SUFFIXES, Entry, Knobs, check_knobs
 
 FILE = Path(__file__).with_name("tuned.yaml")
 SCHEMA = 1

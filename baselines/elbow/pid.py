@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Prediction, RowController
-from baselines.core.entry import Spec
-from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
+from baselines.core.entry import AS_DESIGNED, Bounds, Knobs, Spec
 from baselines.elbow.nominal import ElbowFriction, make_elbow_friction
 from baselines.elbow.valves import PressureLoop, make_pressure_loop
 from baselines.elbow.view import ELBOW_ENTRY, ElbowSignalMap, make_elbow_signal_map

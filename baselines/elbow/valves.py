@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Prediction, RowController
-from baselines.core.entry import Spec
-from baselines.core.knobs import Bounds
+from baselines.core.entry import Bounds, Spec
 from baselines.elbow.view import ELBOW_ENTRY, ElbowSignalMap, ElbowView, make_elbow_signal_map
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis

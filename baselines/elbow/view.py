@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from baselines.core.controller import Array, Reader, Rows, encode_actions, reader
-from baselines.core.entry import Entry, Spec
-from baselines.core.environments import ELBOW
+from baselines.core.entry import ELBOW, Entry, Spec
 from pam_envs.parameters import Signal
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 

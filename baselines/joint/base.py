@@ -31,9 +31,7 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import map_coordinates
 
 from baselines.core.controller import Array, RowController, preview_weights
-from baselines.core.entry import Entry, Spec
-from baselines.core.environments import JOINT
-from baselines.core.knobs import Bounds
+from baselines.core.entry import JOINT, Bounds, Entry, Spec
 from baselines.joint.model import JointModel
 from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint

@@ -29,8 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Prediction
-from baselines.core.entry import Spec
-from baselines.core.knobs import AS_DESIGNED, Knobs
+from baselines.core.entry import AS_DESIGNED, Knobs, Spec
 from baselines.joint.base import (
     JOINT_ENTRY,
     PREVIEW_KNOBS,

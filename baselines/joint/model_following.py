@@ -27,8 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Prediction
-from baselines.core.entry import Spec
-from baselines.core.knobs import Bounds
+from baselines.core.entry import Bounds, Spec
 from baselines.joint.base import (
     JOINT_ENTRY,
     PREVIEW_KNOBS,

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
+from baselines.core.entry import AS_DESIGNED, Bounds, Knobs
 from baselines.knee.identification import Output, identify
 from baselines.knee.published import printed_bumpless, printed_controller
 from baselines.linear.bumpless import Bumpless, BumplessGains, make_bumpless

@@ -29,9 +29,7 @@ from baselines.core.controller import (
     preview_weights,
     reader,
 )
-from baselines.core.entry import Entry, Spec
-from baselines.core.environments import GAIT, KNEE
-from baselines.core.knobs import Bounds
+from baselines.core.entry import GAIT, KNEE, Bounds, Entry, Spec
 from baselines.knee.published import NOMINAL_PRESSURE
 from baselines.knee.view import KneeObserver, KneeView, make_knee_observer
 from pam_envs.hysteresis.protocol import RowsState

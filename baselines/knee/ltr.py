@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Prediction, RowController, encode_action
-from baselines.core.entry import Spec
-from baselines.core.environments import GAIT
+from baselines.core.entry import GAIT, Spec
 from baselines.knee.design import KNOBS, make_loop, printed_loop
 from baselines.knee.feedforward import FORWARD, Forward, Kind, make_forward
 from baselines.knee.feedforward import KNOBS as PREVIEW_KNOBS

@@ -12,9 +12,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from baselines.core.entry import Entry, Spec
-from baselines.core.environments import KNEE
-from baselines.core.knobs import AS_DESIGNED, Knobs
+from baselines.core.entry import AS_DESIGNED, KNEE, Entry, Knobs, Spec
 from baselines.knee.nominal import KneeNominal
 from baselines.knee.published import printed_plant
 from baselines.knee.view import make_knee_observer

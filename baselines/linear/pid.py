@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Prediction, RowController, encode_action
-from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
+from baselines.core.entry import AS_DESIGNED, Bounds, Knobs
 from pam_envs.parameters import Signal
 
 DELAY_PERIODS = 1.5

@@ -25,8 +25,7 @@ from baselines.core.controller import (
     encode_actions,
     reader,
 )
-from baselines.core.entry import Entry, Spec
-from baselines.core.environments import ARM
+from baselines.core.entry import ARM, Entry, Spec
 from pam_envs.mechanics.redundancy.resolution import LIMIT, Resolution, UnreachablePose, resolve
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.parameters import Signal

@@ -37,8 +37,7 @@ from baselines.core.controller import (
     preview_weights,
     reader,
 )
-from baselines.core.entry import Entry, Spec
-from baselines.core.knobs import Bounds
+from baselines.core.entry import Bounds, Entry, Spec
 from baselines.positioning.nominal import Nominal
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.parameters import Signal

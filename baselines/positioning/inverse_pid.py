@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Prediction, RowController, encode_action
-from baselines.core.entry import Spec
-from baselines.core.knobs import Bounds
+from baselines.core.entry import Bounds, Spec
 from baselines.linear.pid import PID_KNOBS, Gains, PidState, pid_start, pid_step
 from baselines.positioning.inverse import INVERSE, Inverse, InverseState, make_inverse
 from baselines.positioning.inverse import KNOBS as INVERSE_KNOBS

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import Reader, reader
-from baselines.core.entry import Entry, Spec
-from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
+from baselines.core.entry import AS_DESIGNED, Bounds, Entry, Knobs, Spec
 from baselines.linear.pid import (
     DELAY_PERIODS,
     FILTER,

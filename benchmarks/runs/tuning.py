@@ -34,7 +34,7 @@ from optuna.trial import TrialState
 
 from agents.settings.seeds import MOST_TUNING, tuning
 from baselines.core import catalogue, tuned
-from baselines.core.knobs import Bounds, Knobs
+from baselines.core.entry import Bounds, Knobs
 from baselines.core.tuned import Tuned, tuned_name
 from benchmarks.identity.hashing import SOURCES, digest, sources_digest
 from benchmarks.runs import cells, controllers

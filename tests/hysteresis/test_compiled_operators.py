@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 SCRIPT = """
 import numpy as np
-from pam_envs.hysteresis import MaxwellSlip, PlayOperator, Preisach
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.maxwell_slip import MaxwellSlip, PlayOperator
 from pam_envs.hysteresis.modified_maxwell_slip import even_model
 from pam_envs.kernels.build import COMPILED
 

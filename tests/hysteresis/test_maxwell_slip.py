@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pam_envs.hysteresis import MaxwellSlip, PlayOperator
+from pam_envs.hysteresis.maxwell_slip import MaxwellSlip, PlayOperator
 
 Array = NDArray[np.float64]
 Step = Callable[[float, Array], Array]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pam_envs.hysteresis import MaxwellSlip
+from pam_envs.hysteresis.maxwell_slip import MaxwellSlip
 from pam_envs.hysteresis.modified_maxwell_slip import (
     ModifiedMaxwellSlip,
     even_model,

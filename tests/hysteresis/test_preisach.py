@@ -10,15 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pam_envs.hysteresis import (
-    PlayOperator,
-    Preisach,
-    PreisachState,
+from pam_envs.hysteresis.everett import (
+    everett,
     symmetry_error,
     table_from_weights,
     weights_from_table,
 )
-from pam_envs.hysteresis.everett import everett
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach, PreisachState
 
 Array = NDArray[np.float64]
 LOW, HIGH, CELLS = -1.0, 1.0, 8

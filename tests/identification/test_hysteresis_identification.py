@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pam_envs.hysteresis import PlayOperator, Preisach, symmetry_error
+from pam_envs.hysteresis.everett import symmetry_error
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.preisach_forc import (
     congruency_error,
     curve_inputs,

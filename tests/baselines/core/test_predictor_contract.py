@@ -10,7 +10,7 @@ import pytest
 
 from baselines.core.catalogue import PUBLISHED
 from baselines.core.checks import check_controller
-from baselines.core.environments import ELBOW, KNEE, POSITIONING
+from baselines.core.entry import ELBOW, KNEE, POSITIONING
 from tests.baselines.conftest import ID, built, make_env, observations_of
 
 PAIRS = [(name, env) for name, entry in PUBLISHED.items() for env in entry.envs]

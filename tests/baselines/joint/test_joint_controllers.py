@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.core.catalogue import PUBLISHED, make_controller
-from baselines.core.entry import Spec
-from baselines.core.environments import JOINT
+from baselines.core.entry import JOINT, Spec
 from baselines.joint.base import Gravity
 from baselines.joint.model import joint_model
 from baselines.joint.poles import FREQUENCIES, phase

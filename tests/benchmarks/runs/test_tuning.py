@@ -10,7 +10,7 @@ import pytest
 
 from agents.settings import seeds
 from baselines.core import tuned
-from baselines.core.knobs import Knobs
+from baselines.core.entry import Knobs
 from benchmarks.runs import tuning
 from benchmarks.runs.tuning import Course, Job, Measured, job_of, seeds_of, worth
 from benchmarks.scenarios import scenario as scenarios
