@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from baselines.core.controller import Array, Prediction, RowController, encode_actions, row_count
 from baselines.core.entry import ELBOW, JOINT, KNEE, POSITIONING, Entry, Spec
-from baselines.joint.view import make_joint_signal_map
+from baselines.joint.base import make_joint_signal_map
 from baselines.knee.published import NOMINAL_PRESSURE
 from pam_envs.parameters import Signal
 

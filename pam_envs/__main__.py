@@ -7,7 +7,7 @@ import itertools
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -243,7 +243,7 @@ def diagnose(
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     register_all()
-    commands = {
+    commands: dict[str, Callable[..., Any]] = {
         "list": list_environments,
         "render": render,
         "identify": identify,

@@ -15,8 +15,7 @@ from queue import Empty, SimpleQueue
 from dask.distributed import Client, Future
 from distributed.scheduler import KilledWorker
 
-from sweeps.task import Act, Done, Task
-from sweeps.worker import do_in_cluster
+from sweeps.worker import Act, Done, Task, do_in_cluster
 
 SECONDS = 10.0
 """Timeout of the first connection."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from sweeps.task import Act, Done, Task
+from sweeps.worker import Act, Done, Task
 
 
 @dataclass(frozen=True)

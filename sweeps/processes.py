@@ -10,8 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 
-from sweeps.task import Act, Done, Task
-from sweeps.worker import do, end_with
+from sweeps.worker import Act, Done, Task, do, end_with
 
 ATTEMPTS = 3
 """Attempts at a task whose process dies."""

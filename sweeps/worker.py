@@ -1,4 +1,4 @@
-"""Execution of a task in a worker process."""
+"""Tasks, their outcomes, and their execution in a worker process."""
 
 from __future__ import annotations
 
@@ -6,8 +6,44 @@ import os
 import sys
 import threading
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
 
-from sweeps.task import Act, Done, Task
+
+class Task(Protocol):
+    """A unit of work."""
+
+    @property
+    def key(self) -> str:
+        """Digest of all inputs of the result."""
+        ...
+
+
+Act = Callable[[Any], Any]
+"""Executes a task in a worker: a function of a module that workers can import."""
+
+
+@dataclass(frozen=True)
+class Done:
+    """Outcome of a task.
+
+    Attributes
+    ----------
+    key : str
+    value : object
+        Return value of the function.
+    error : str, optional
+        Reason for a missing value.
+    lost : bool
+        Whether the reason is that its workers died.
+    """
+
+    key: str
+    value: Any = None
+    error: str | None = None
+    lost: bool = False
+
 
 LOOK = 0.25
 """Seconds between two checks that the driver is alive."""

@@ -20,9 +20,15 @@ from numpy.typing import ArrayLike
 
 from baselines.core.controller import Prediction, RowController, row_count
 from baselines.core.entry import Spec
-from baselines.elbow.nominal import ElbowFriction, make_elbow_friction, pressures_for
+from baselines.elbow.nominal import (
+    ELBOW_ENTRY,
+    ElbowFriction,
+    ElbowSignalMap,
+    make_elbow_friction,
+    make_elbow_signal_map,
+    pressures_for,
+)
 from baselines.elbow.valves import EARLY_KNOBS, KNOBS, PressureLoop, make_pressure_loop
-from baselines.elbow.view import ELBOW_ENTRY, ElbowSignalMap, make_elbow_signal_map
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 

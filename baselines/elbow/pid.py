@@ -22,9 +22,14 @@ from numpy.typing import ArrayLike
 
 from baselines.core.controller import Prediction, RowController
 from baselines.core.entry import AS_DESIGNED, Bounds, Knobs, Spec
-from baselines.elbow.nominal import ElbowFriction, make_elbow_friction
+from baselines.elbow.nominal import (
+    ELBOW_ENTRY,
+    ElbowFriction,
+    ElbowSignalMap,
+    make_elbow_friction,
+    make_elbow_signal_map,
+)
 from baselines.elbow.valves import PressureLoop, make_pressure_loop
-from baselines.elbow.view import ELBOW_ENTRY, ElbowSignalMap, make_elbow_signal_map
 from baselines.linear.pid import PI_KNOBS, Gains, PidState, pid_start, pid_step, simc_rule
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis

@@ -44,8 +44,7 @@ from baselines.joint.loop import (
     pole_cancelling,
     slow_gains,
 )
-from baselines.joint.model import POLE, JointModel, joint_model
-from baselines.joint.poles import joint_poles
+from baselines.joint.model import POLE, JointModel, joint_model, joint_poles
 from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.linear.pid import DELAY_PERIODS, FILTER, PID_KNOBS, Simc, simc_rule
 from baselines.linear.systems import DiscreteSystem, StateSpace, discrete, from_polynomials

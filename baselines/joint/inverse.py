@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike
 from baselines.core.controller import Prediction
 from baselines.core.entry import Spec
 from baselines.joint.base import JOINT_ENTRY, PREVIEW_KNOBS, JointController, make_parts
-from baselines.joint.model import joint_model
-from baselines.joint.poles import joint_delays
+from baselines.joint.model import joint_delays, joint_model
 from pam_envs.hysteresis.protocol import RowsState
 
 

@@ -36,8 +36,7 @@ from baselines.joint.base import (
     make_parts,
 )
 from baselines.joint.loop import DAMPING, make_loop, make_model_loop
-from baselines.joint.model import joint_model
-from baselines.joint.poles import joint_poles
+from baselines.joint.model import joint_model, joint_poles
 from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.linear.systems import DiscreteSystem
 from baselines.robust.loops import Kind, robust_controller

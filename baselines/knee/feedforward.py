@@ -30,8 +30,8 @@ from baselines.core.controller import (
     reader,
 )
 from baselines.core.entry import GAIT, KNEE, Bounds, Entry, Spec
+from baselines.knee.nominal import KneeObserver, KneeView, make_knee_observer
 from baselines.knee.published import NOMINAL_PRESSURE
-from baselines.knee.view import KneeObserver, KneeView, make_knee_observer
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.parameters import Signal
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis

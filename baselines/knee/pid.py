@@ -13,9 +13,8 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from baselines.core.entry import AS_DESIGNED, KNEE, Entry, Knobs, Spec
-from baselines.knee.nominal import KneeNominal
+from baselines.knee.nominal import KneeNominal, make_knee_observer
 from baselines.knee.published import printed_plant
-from baselines.knee.view import make_knee_observer
 from baselines.linear.pid import DELAY_PERIODS, PI_KNOBS, Gains, Pid, PidView, simc_rule
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.positioning.contraction_errors import positioning_error_table
+from baselines.positioning.contraction_tables import positioning_error_table
 from benchmarks.papers.published import Figure, Group
 from benchmarks.scenarios.scenario_env import make_env
 from pam_envs.data.tables import load_contraction_table

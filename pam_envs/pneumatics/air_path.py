@@ -6,11 +6,11 @@ from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.kernels.history import note, noted
-from pam_envs.pneumatics.line import line_step
 from pam_envs.pneumatics.regulator import (
     AIR,
     AIR_STATE,
     DELAY_PERIODS,
+    line_step,
     regulate_with_effects,
     regulate_with_gain,
 )

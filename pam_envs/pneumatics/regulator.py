@@ -11,11 +11,93 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from pam_envs.constants import ATMOSPHERE
-from pam_envs.kernels.arithmetic import count_on, decay
+from pam_envs.kernels.arithmetic import TURN, count_on, decay
 from pam_envs.kernels.build import kernel
+from pam_envs.kernels.motion import resonator_step
 from pam_envs.parameters import assumed, derived, effect, named_rows, parameter_rows, published
-from pam_envs.pneumatics.line import LineEffects
-from pam_envs.pneumatics.supply import AMPLE, SupplyEffects, supplied, supply_drop
+
+AMPLE = 2e7
+"""Supply pressure [Pa] that limits nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SupplyEffects:
+    """Supply of a regulator, without limit by default."""
+
+    supply_pressure: float = assumed(AMPLE, "Pa", 5e4, AMPLE, "reservoir at rest", neutral=AMPLE)
+    supply_droop: float = effect("1", 0.0, 5.0, "supply pressure lost over pressure filled")
+    supply_time: float = assumed(0.01, "s", 0.001, 5.0, "filling time at full flow")
+    supply_recovery: float = assumed(10.0, "s", 0.1, 1e3, "filling time of the empty reservoir")
+
+
+@kernel
+def norm_8(a: float, b: float) -> float:
+    """Return the eighth root of the sum of eighth powers: a slightly rounded maximum."""
+    a2, b2 = a * a, b * b
+    a4, b4 = a2 * a2, b2 * b2
+    return math.sqrt(math.sqrt(math.sqrt(a4 * a4 + b4 * b4)))
+
+
+@kernel
+def supplied(
+    pressure: float, reached: float, rest: float, drop: float, time: float, h: float
+) -> float:
+    """Return the pressure [Pa] after ``h`` seconds, limited by the flow of the supply.
+
+    ``reached`` is the pressure without the limit, ``rest`` the supply pressure at rest, ``drop``
+    its drop, ``time`` the ``supply_time`` [s]. The flow is choked, and goes with the root of the
+    difference near the supply's pressure.
+    """
+    supply = rest - drop
+    most = (supply + ATMOSPHERE) / time
+    head = math.sqrt(max(0.0, supply - pressure))
+    head = max(0.0, head - h * most / math.sqrt(2.0 * max(1.0, supply + ATMOSPHERE)))
+    throat = max(0.0, min(h * most, supply - head * head - pressure))
+    filling = max(1e-9, reached - pressure)
+    share = throat / norm_8(filling, throat)  # the narrower of valve and throat, hardly rounded
+    ample = reached <= pressure or rest >= AMPLE
+    return reached if ample else pressure + filling * share
+
+
+@kernel
+def supply_drop(
+    drop: float, filled: float, rest: float, droop: float, recovery: float, h: float
+) -> float:
+    """Return the drop of the supply pressure [Pa] after a muscle was filled by ``filled`` [Pa].
+
+    The reservoir is filled through an orifice, as the root of the drop.
+    """
+    lacks = math.sqrt(drop + droop * max(0.0, filled))
+    full = math.sqrt(0.5 * (rest + ATMOSPHERE))
+    lacks = max(0.0, lacks - full * h / recovery)
+    return lacks * lacks
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineEffects:
+    """Resonance of the line behind a regulator."""
+
+    ring_share: float = effect("1", 0.0, 1.0, "share of the pressure behind a line that rings")
+    ring_flow: float = effect("1", -2.0, 2.0, "ringing that goes with the flow")
+    ring_frequency: float = assumed(7.0, "Hz", 0.5, 20.0, "of the line")
+    ring_damping: float = assumed(0.1, "1", 0.005, 2.0, "damping ratio of the line")
+
+
+LINE = parameter_rows(LineEffects)
+"""Rows of a line's effects, from its first."""
+
+
+@kernel
+def line_step(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, was: float, now: float, h: float
+) -> float:
+    """Return the pressure [Pa] behind the line whose input went from ``was`` to ``now``."""
+    turns, ratio = fixed[effects + LINE.ring_frequency][j], fixed[effects + LINE.ring_damping][j]
+    swung, rate = resonator_step(rows, j, state, was, now, turns, ratio, h)
+    part = fixed[effects + LINE.ring_share][j]
+    flow = fixed[effects + LINE.ring_flow][j] * rate / (TURN * turns)
+    return max(0.0, (1.0 - part) * now + part * swung + flow)
+
 
 DELAY_PERIODS = 12
 """Longest dead time, in control periods, that a command history has to hold."""

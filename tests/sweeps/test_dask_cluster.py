@@ -11,7 +11,7 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from sweeps.engine import Cluster, run
-from sweeps.task import Done
+from sweeps.worker import Done
 from tests.sweeps.dask_processes import DaskProcesses
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
 from tests.sweeps.sweep_fakes import Number, square

@@ -12,7 +12,7 @@ from joblib.externals.loky import get_reusable_executor
 
 from sweeps import worker
 from sweeps.engine import Cluster, run
-from sweeps.task import Done
+from sweeps.worker import Done
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
 from tests.sweeps.sweep_fakes import Number, square
 

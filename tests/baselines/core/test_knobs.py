@@ -16,7 +16,7 @@ from baselines.core import tuned
 from baselines.core.catalogue import CONTROLLERS, PUBLISHED
 from baselines.joint import model as joint_model
 from baselines.joint.loop import make_model_loop
-from baselines.knee import design as knee_design
+from baselines.knee import ltr as knee_design
 from baselines.linear.pid import simc_rule
 from benchmarks.papers.joint_studies import ReducedRig
 from pam_envs.identification.frequency import fit_rational

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.elbow.nominal import make_elbow_friction, pressures_for
+from baselines.elbow.nominal import make_elbow_friction, make_elbow_signal_map, pressures_for
 from baselines.elbow.valves import make_pressure_loop
-from baselines.elbow.view import make_elbow_signal_map
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from tests.baselines.conftest import built, make_env, rms, rollout, spec_of
 

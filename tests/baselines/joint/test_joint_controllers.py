@@ -9,10 +9,8 @@ import pytest
 
 from baselines.core.catalogue import PUBLISHED, make_controller
 from baselines.core.entry import JOINT, Spec
-from baselines.joint.base import Gravity
-from baselines.joint.model import joint_model
-from baselines.joint.poles import FREQUENCIES, phase
-from baselines.joint.view import make_joint_signal_map
+from baselines.joint.base import Gravity, make_joint_signal_map
+from baselines.joint.model import FREQUENCIES, joint_model, phase
 from benchmarks.papers.joint_studies import (
     ACTIONS,
     DEGREE,

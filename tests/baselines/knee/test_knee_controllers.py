@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from baselines.knee import identification as knee_identification
-from baselines.knee.design import BANDWIDTHS, design, make_loop
 from baselines.knee.identification import FREQUENCIES, frequency_response, identify
+from baselines.knee.ltr import BANDWIDTHS, design, make_loop
 from baselines.linear.bumpless import BumplessGains, certificate
 from baselines.linear.systems import state_space
 from benchmarks.scoring.groups.knee import landings

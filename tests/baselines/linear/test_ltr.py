@@ -24,7 +24,6 @@ from baselines.linear.ltr import (
     loop_figures,
     sampled_figures,
 )
-from baselines.linear.reduction import residualised
 from baselines.linear.systems import (
     DiscreteSystem,
     discrete,
@@ -32,6 +31,7 @@ from baselines.linear.systems import (
     from_roots,
     state_space,
 )
+from baselines.robust.synthesis import residualised
 from pam_envs.identification.frequency import fit_rational
 
 PLANT = printed_plant()

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from baselines.linear.ltr import integrator
-from baselines.linear.reduction import residualised, split, without_fast
 from baselines.linear.systems import discrete, from_roots, response
 from baselines.robust import synthesis
 from baselines.robust.loops import frozen, robust_controller
 from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
+from baselines.robust.synthesis import residualised, split, without_fast
 
 DESIGN = RobustDesign()
 

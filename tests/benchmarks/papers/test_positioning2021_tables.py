@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.positioning import contraction_errors as errors
 from baselines.positioning import contraction_tables as curves
 from benchmarks.papers import positioning as published
 from pam_envs.data.tables import BAR, MM, load_contraction_table
@@ -211,7 +210,7 @@ place of 1.43 bar, as the paper fitted it."""
 
 @pytest.fixture(scope="module")
 def positioning():
-    return errors.positioning_error_table(TABLE)
+    return curves.positioning_error_table(TABLE)
 
 
 @pytest.mark.parametrize("inverse", POSITIONING)

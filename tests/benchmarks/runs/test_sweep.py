@@ -21,7 +21,7 @@ from benchmarks.runs.store import read_json
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
 from sweeps import engine
-from sweeps.task import Done
+from sweeps.worker import Done
 from tests.benchmarks.conftest import CONTENT
 from tests.sweeps.dask_processes import DaskProcesses
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
