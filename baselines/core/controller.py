@@ -9,7 +9,7 @@ single observation); it is passed in and returned, and never changed in place.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar, final
 
 import numpy as np
@@ -184,14 +184,28 @@ def _merged(start: Rows, fresh: S, old: S) -> S:
     return type(fresh)(*parts) if hasattr(fresh, "_fields") else type(fresh)(parts)
 
 
-def group_by_load(load: Array) -> Iterator[tuple[float, Any]]:
-    """Yield each load [kg], rounded to ``LOAD_DIGITS``, with the index of its rows.
+def by_load(load: Array, respond: Callable[..., Any], *arguments: Any) -> Any:
+    """Return ``respond(load, *arguments)`` for the rows of each load [kg].
 
-    The index is ``slice(None)`` if all rows have the same load.
+    Loads are rounded to ``LOAD_DIGITS``. Arguments and results are (tuples of) arrays with the row
+    as first axis.
     """
     if len(load) == 1 or (load == load[0]).all():
-        yield round(float(load[0]), LOAD_DIGITS), slice(None)
-        return
+        return respond(round(float(load[0]), LOAD_DIGITS), *arguments)
     keys = np.round(load, LOAD_DIGITS)
-    for key in np.unique(keys):
-        yield float(key), np.flatnonzero(keys == key)
+    groups = [(np.flatnonzero(keys == key), float(key)) for key in np.unique(keys)]
+    return _joined([(rows, respond(key, *_taken(arguments, rows))) for rows, key in groups])
+
+
+def _taken(values: Any, rows: Any) -> Any:
+    return tuple(_taken(v, rows) for v in values) if isinstance(values, tuple) else values[rows]
+
+
+def _joined(parts: list[tuple[Any, Any]]) -> Any:
+    first = parts[0][1]
+    if isinstance(first, tuple):
+        return tuple(_joined([(rows, part[k]) for rows, part in parts]) for k in range(len(first)))
+    whole = np.empty((sum(len(rows) for rows, _ in parts), *first.shape[1:]), first.dtype)
+    for rows, part in parts:
+        whole[rows] = part
+    return whole

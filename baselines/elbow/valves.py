@@ -16,8 +16,9 @@ Each loop also gives the limits of the pressures at the end of its next step.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,22 +41,52 @@ EARLY_KNOBS: Bounds = {**KNOBS, "step": (0.5, 4.0)}
 
 
 @dataclass(frozen=True)
-class RegulatorLoop:
-    """For proportional regulators; see the module."""
+class PressureLoop(ABC):
+    """From reference pressures [Pa] to commands, and to the limits of the next step.
+
+    ``factor`` acts on the pressure error, ``step`` on the reachable change of pressure.
+    """
 
     plant: ElbowOrthosis
+    factor: float = 1.0
+    step: float = 1.0
+
+    @final
+    def commands(self, view: ElbowView, reference: Array) -> Array:
+        """Return setpoints [Pa], or pulse widths [s]: 0 where no pulse is accepted."""
+        return self._commands(view, self._beyond(view, reference, self.factor))
+
+    @final
+    def reach(self, view: ElbowView) -> tuple[Array, Array]:
+        """Return the lowest and highest pressures [Pa] of the next step, shapes (2, n_env)."""
+        low, high = self._reach(view)
+        return self._beyond(view, low, self.step), self._beyond(view, high, self.step)
+
+    def _beyond(self, view: ElbowView, pressure: Array, factor: float) -> Array:
+        if factor == 1.0:
+            return pressure
+        sensed = view.pressure
+        return np.clip(sensed + factor * (pressure - sensed), 0.0, self.plant.full_pressure)
+
+    @abstractmethod
+    def _commands(self, view: ElbowView, reference: Array) -> Array: ...
+
+    @abstractmethod
+    def _reach(self, view: ElbowView) -> tuple[Array, Array]: ...
+
+
+class RegulatorLoop(PressureLoop):
+    """For proportional regulators; see the module."""
 
     @property
     def _time(self) -> float:
         return LOOP_PERIODS * self.plant.control_period
 
-    def commands(self, view: ElbowView, reference: Array) -> Array:
-        """Return setpoints [Pa]."""
+    def _commands(self, view: ElbowView, reference: Array) -> Array:
         lead = max(1.0, self.plant.regulator.time_constant / self._time)
         return view.pressure + lead * (reference - view.pressure)
 
-    def reach(self, view: ElbowView) -> tuple[Array, Array]:
-        """Return the pressures [Pa] reachable in ``LOOP_PERIODS`` periods."""
+    def _reach(self, view: ElbowView) -> tuple[Array, Array]:
         law, time = self.plant.regulator, self._time
         share, most = 1.0 - math.exp(-time / law.time_constant), time * law.slew_rate
         there = view.pressure
@@ -63,14 +94,10 @@ class RegulatorLoop:
         return low, np.minimum(there + share * (self.plant.full_pressure - there), there + most)
 
 
-@dataclass(frozen=True)
-class PulseLoop:
+class PulseLoop(PressureLoop):
     """For pairs of on/off valves; see the module."""
 
-    plant: ElbowOrthosis
-
-    def commands(self, view: ElbowView, reference: Array) -> Array:
-        """Return pulse widths [s]; 0 where no pulse is accepted."""
+    def _commands(self, view: ElbowView, reference: Array) -> Array:
         inside, still, per_volume = self._closed(view)
         short = (reference + ATMOSPHERE) / per_volume - inside
         widths = [
@@ -79,8 +106,7 @@ class PulseLoop:
         ]
         return np.where(view.accepts, np.array(widths), 0.0)
 
-    def reach(self, view: ElbowView) -> tuple[Array, Array]:
-        """Return the pressures [Pa] reachable by the longest pulses."""
+    def _reach(self, view: ElbowView) -> tuple[Array, Array]:
         plant, (_, still, per_volume) = self.plant, self._closed(view)
         time = plant.cycle - plant.valve.opening_time + plant.valve.closing_time
         filled, emptied = (
@@ -132,42 +158,10 @@ class PulseLoop:
         return width if short > 0.0 else -width
 
 
-@dataclass(frozen=True)
-class ScaledLoop:
-    """An inner loop with factors on the pressure error and on the reachable limits.
-
-    ``full`` is the largest pressure [Pa].
-    """
-
-    loop: RegulatorLoop | PulseLoop
-    factor: float
-    step: float
-    full: float
-
-    def commands(self, view: ElbowView, reference: Array) -> Array:
-        """Return the commands of the inner loop."""
-        return self.loop.commands(view, self._beyond(view, reference, self.factor))
-
-    def reach(self, view: ElbowView) -> tuple[Array, Array]:
-        """Return the scaled limits [Pa] of the next step."""
-        low, high = self.loop.reach(view)
-        return self._beyond(view, low, self.step), self._beyond(view, high, self.step)
-
-    def _beyond(self, view: ElbowView, pressure: Array, factor: float) -> Array:
-        sensed = view.pressure
-        return np.clip(sensed + factor * (pressure - sensed), 0.0, self.full)
-
-
-PressureLoop = RegulatorLoop | PulseLoop | ScaledLoop
-"""From reference pressures [Pa] to commands, and to the limits of the next step, (2, n_env)."""
-
-
 def make_pressure_loop(spec: Spec[ElbowOrthosis]) -> PressureLoop:
     """Return the inner loop for the valves of a nominal plant; its knobs are ``EARLY_KNOBS``."""
-    plant = spec.plant
-    loop = PulseLoop(plant) if plant.valves == "on_off" else RegulatorLoop(plant)
-    factor, step = spec.knob("pressure_loop"), spec.knob("step")
-    return loop if factor == step == 1.0 else ScaledLoop(loop, factor, step, plant.full_pressure)
+    kind = PulseLoop if spec.plant.valves == "on_off" else RegulatorLoop
+    return kind(spec.plant, spec.knob("pressure_loop"), spec.knob("step"))
 
 
 @dataclass(frozen=True)

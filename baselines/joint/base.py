@@ -5,7 +5,7 @@ a control period of the hold, by linear interpolation of the previewed samples. 
 horizon is too short, as for the slow joints of an arm, the line from the present to the last sample
 is extrapolated.
 
-The loop of the pole-cancelling PI and the nominal model (:mod:`baselines.joint.loop`) is, at a
+The loop of the pole-cancelling PI and the nominal model (:mod:`baselines.joint.model`) is, at a
 damping of ``1 / sqrt(2)``,
 
     T(s) = 1 / (1 + 2 (s / p) + 2 (s / p)^2)
@@ -159,11 +159,6 @@ ANGLES, TORQUES = 61, 81
 """Size of the table of shifts."""
 LARGEST_TORQUE = 8.0
 """End of the table [N m]; torques are clipped to it."""
-
-
-def double_pole_delays(poles: Sequence[float]) -> list[float]:
-    """Return the delay [s] of double poles [rad/s], with or without the PI's feedback."""
-    return [2.0 / pole for pole in poles]
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Feedback of the joints' angles without a model of the hysteresis: PI, slow PI and PID.
 
-PI and slow PI: :mod:`baselines.joint.loop`; fluidic_muscles, section 4, with the gain of the
+PI and slow PI: :mod:`baselines.joint.model`; fluidic_muscles, section 4, with the gain of the
 nominal plant between the tips of the hysteresis loop.
 
 PID: SIMC (:mod:`baselines.linear.pid`) for both lags ``1 / p`` and the gain of the nominal plant,
@@ -20,7 +20,6 @@ With preview, a loop tracks the reference later by its own delay (:mod:`baseline
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, NamedTuple
@@ -34,17 +33,18 @@ from baselines.joint.base import (
     JOINT_ENTRY,
     PREVIEW_KNOBS,
     JointController,
-    double_pole_delays,
     make_parts,
 )
-from baselines.joint.loop import (
-    SLOW_CROSSOVER,
+from baselines.joint.model import (
+    DAMPING,
+    SLOW_DAMPING,
+    joint_model,
+    joint_poles,
     make_loop,
+    pi_delay,
     pi_system,
     pole_cancelling,
-    slow_gains,
 )
-from baselines.joint.model import POLE, JointModel, joint_model, joint_poles
 from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.linear.pid import DELAY_PERIODS, FILTER, PID_KNOBS, Simc, simc_rule
 from baselines.linear.systems import DiscreteSystem, StateSpace, discrete, from_polynomials
@@ -132,42 +132,27 @@ def make_joint_feedback(
     spec: Spec[Any], kind: Kind = "pi", gravity: bool = False, ahead: bool = False
 ) -> JointFeedback:
     """Return the controller, optionally with gravity feedforward and preview of its own delay."""
-    plant = spec.plant
+    plant, in_arm = spec.plant, spec.plant.stages > 1
     model = joint_model(plant, joint_poles(plant)).narrowed(0.0)
-    loops = _loops(model, kind, plant.stages > 1, spec.knobs)
-    parts = make_parts(spec, model, gravity, loops.delays if ahead else None)
-    return JointFeedback(parts, loops.loop, loops.prefilter)
-
-
-class Loops(NamedTuple):
-    """Loops of a nominal model, delays [s] of the closed loops for slow references, and filters."""
-
-    loop: Bumpless
-    delays: Sequence[float]
-    prefilter: DiscreteSystem
-
-
-def _loops(model: JointModel, kind: Kind, in_arm: bool, knobs: Knobs) -> Loops:
-    if kind in ("pid", "pid_smooth"):
+    prefilter = DiscreteSystem.identity(len(model.poles), model.period)
+    if kind in ("pi", "pi_slow"):
+        damping = SLOW_DAMPING if kind == "pi_slow" else DAMPING
+        loop = make_loop(model, lambda p: pi_system(pole_cancelling(model.gain, p, damping)))
+        delays = [pi_delay(pole, damping) for pole in model.poles]
+    else:
 
         def rule(pole: float) -> Simc:
-            return simc_joint(model.gain, pole, model.period, in_arm, kind == "pid_smooth", knobs)
+            smooth = kind == "pid_smooth"
+            return simc_joint(model.gain, pole, model.period, in_arm, smooth, spec.knobs)
 
         laws = [rule(pole) for pole in model.poles]
         filters = [discrete(reference_filter(law), model.period) for law in laws]
+        prefilter = DiscreteSystem.stacked(filters)
         loop = make_loop(model, lambda pole: pid_system(rule(pole)))
         delays = [pid_delay(law, model.gain) for law in laws]
-        return Loops(loop, delays, DiscreteSystem.stacked(filters))
-    slow = kind == "pi_slow"
-
-    def pi(pole: float) -> StateSpace:
-        return pi_system((slow_gains if slow else pole_cancelling)(model.gain, pole))
-
-    delays = double_pole_delays(model.poles)
-    if slow:
-        delays = [POLE / (SLOW_CROSSOVER * pole) for pole in model.poles]
-    identity = DiscreteSystem.identity(len(model.poles), model.period)
-    return Loops(make_loop(model, pi), delays, identity)
+    return JointFeedback(
+        make_parts(spec, model, gravity, delays if ahead else None), loop, prefilter
+    )
 
 
 PI = partial(JOINT_ENTRY, feedback=True)

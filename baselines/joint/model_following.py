@@ -14,7 +14,7 @@ and an exact model of the motion the joint equals its model, and the disturbance
 ``H^-1`` is the exact recursive inverse of the identified hysteresis (:mod:`baselines.joint.model`),
 for the history of commands; without it ``u = (u_mod + u_dis) / K``. ``u_mod`` is limited to the
 angles that can be held, so that the model saturates as the joint does, and ``u_dis`` to the rest;
-the disturbance loop receives the applied command (:mod:`baselines.joint.loop`).
+the disturbance loop receives the applied command (:mod:`baselines.joint.model`).
 """
 
 from __future__ import annotations
@@ -32,11 +32,16 @@ from baselines.joint.base import (
     JOINT_ENTRY,
     PREVIEW_KNOBS,
     JointController,
-    double_pole_delays,
     make_parts,
 )
-from baselines.joint.loop import DAMPING, make_loop, make_model_loop
-from baselines.joint.model import joint_model, joint_poles
+from baselines.joint.model import (
+    DAMPING,
+    joint_model,
+    joint_poles,
+    make_loop,
+    make_model_loop,
+    pi_delay,
+)
 from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.linear.systems import DiscreteSystem
 from baselines.robust.loops import Kind, robust_controller
@@ -112,7 +117,7 @@ def make_model_following(
     """
     model = joint_model(spec.plant, joint_poles(spec.plant)).narrowed(inverse)
     damping, pace = spec.knob("damping"), spec.knob("disturbance")
-    delays = [damping**2 * delay for delay in double_pole_delays(model.poles)]
+    delays = [pi_delay(pole, damping * DAMPING) for pole in model.poles]
     return ModelFollowing(
         make_parts(spec, model, gravity, delays if ahead else None),
         make_model_loop(model, damping * DAMPING),

@@ -22,7 +22,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,7 +38,7 @@ from baselines.core.controller import (
     reader,
 )
 from baselines.core.entry import Bounds, Entry, Spec
-from baselines.positioning.nominal import Nominal
+from baselines.positioning.nominal import LoadedMuscle, Nominal
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.parameters import Signal
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -96,14 +96,12 @@ class Inverse(RowController):
     def explaining_state(self, measured: Array) -> InverseState:
         """Return the state that explains first measurements, rows as in ``reader``."""
         contraction, pressure, load = measured[:3]
-        hysteresis: Any = None
-        for muscle, rows in self.nominal.groups(load):
-            part = muscle.explain(contraction[rows], pressure[rows])
-            hysteresis = _placed(hysteresis, part, rows, len(load))
-        drive = np.empty(len(load))
-        for muscle, rows in self.nominal.groups(load):
-            drive[rows] = muscle.advance(pressure[rows], _taken(hysteresis, rows))[0]
-        return InverseState(pressure, drive, hysteresis)
+
+        def explained(muscle: LoadedMuscle, x: Array, p: Array) -> tuple[Array, RowsState]:
+            hysteresis = muscle.explain(x, p)
+            return muscle.advance(p, hysteresis)[0], hysteresis
+
+        return InverseState(pressure, *self.nominal.each(load, explained, contraction, pressure))
 
     def feed_forward(self, measured: Array, now: InverseState) -> Array:
         """Return the setpoint [Pa], shape (n_env,), for the reference."""
@@ -116,13 +114,12 @@ class Inverse(RowController):
         """Return the target pressure [Pa]: that of the last target that is due."""
         load = measured[2]
         aims = np.add.reduce(self.aims[:, :, None] * measured[3:], axis=1)
-        target = np.empty_like(aims)
-        for muscle, rows in self.nominal.groups(load):
-            drive = muscle.drive_for(aims[:, rows]).ravel()
-            hysteresis = tuple(
-                np.concatenate([a] * len(aims)) for a in _taken(now.hysteresis, rows)
-            )
-            target[:, rows] = muscle.pressure_for(drive, hysteresis).reshape(len(aims), -1)
+
+        def pressures(muscle: LoadedMuscle, aims: Array, hysteresis: RowsState) -> Array:
+            held = tuple(np.repeat(a, aims.shape[1], axis=0) for a in hysteresis)
+            return muscle.pressure_for(muscle.drive_for(aims.ravel()), held).reshape(aims.shape)
+
+        target = self.nominal.each(load, pressures, aims.T, now.hysteresis).T
         travel = np.abs(target - now.pressure) / self.nominal.plant.regulator.slew_rate
         due = travel >= self.due[:, None]
         last = len(aims) - 1 - np.argmax(due[::-1], axis=0)
@@ -131,26 +128,8 @@ class Inverse(RowController):
     def advance(self, now: InverseState, set_point: Array, load: Array) -> InverseState:
         """Return the nominal muscle's state one control period later."""
         pressure = self.nominal.next_pressure(now.pressure, set_point)
-        drive = np.empty(len(load))
-        hysteresis: Any = None
-        for muscle, rows in self.nominal.groups(load):
-            drive[rows], part = muscle.advance(pressure[rows], _taken(now.hysteresis, rows))
-            hysteresis = _placed(hysteresis, part, rows, len(load))
-        return InverseState(pressure, drive, hysteresis)
-
-
-def _taken(hysteresis: RowsState, rows: Any) -> RowsState:
-    return hysteresis if isinstance(rows, slice) else tuple(a[rows] for a in hysteresis)
-
-
-def _placed(whole: Any, part: RowsState, rows: Any, n: int) -> RowsState:
-    if isinstance(rows, slice):
-        return part
-    if whole is None:
-        whole = tuple(np.empty((n, *a.shape[1:]), a.dtype) for a in part)
-    for to, a in zip(whole, part, strict=True):
-        to[rows] = a
-    return tuple(whole)
+        after = self.nominal.each(load, LoadedMuscle.advance, pressure, now.hysteresis)
+        return InverseState(pressure, *after)
 
 
 def aims_of(times: Sequence[float], lead: float, early: float = EARLY) -> tuple[Array, Array]:

@@ -21,6 +21,7 @@ from baselines.core.entry import Bounds, Spec
 from baselines.linear.pid import PID_KNOBS, Gains, PidState, pid_start, pid_step
 from baselines.positioning.inverse import INVERSE, Inverse, InverseState, make_inverse
 from baselines.positioning.inverse import KNOBS as INVERSE_KNOBS
+from baselines.positioning.nominal import LoadedMuscle
 from baselines.positioning.pid import simc
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
@@ -82,10 +83,8 @@ class InversePid(RowController):
 
     def _at_rest(self, state: InverseState, load: Array) -> Array:
         """Return the nominal contraction at rest [m], shape (n_env,)."""
-        value = np.empty(len(load))
-        for muscle, rows in self.inverse.nominal.groups(load):
-            value[rows] = muscle.contraction_at(state.drive[rows])
-        return value
+        nominal = self.inverse.nominal
+        return np.asarray(nominal.each(load, LoadedMuscle.contraction_at, state.drive))
 
 
 def make_inverse_pid(spec: Spec[SingleMuscle], preview: bool = True) -> InversePid:

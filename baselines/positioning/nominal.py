@@ -8,14 +8,14 @@ inverse, static curve) is prepared when that load first occurs.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from baselines.core.controller import Array, group_by_load
+from baselines.core.controller import Array, by_load
 from baselines.positioning.contraction_tables import LOADS
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
@@ -104,10 +104,9 @@ class Nominal:
         """Return the plant with a load [kg], cached."""
         return cache(partial(LoadedMuscle, self.plant))
 
-    def groups(self, load: Array) -> Iterator[tuple[LoadedMuscle, Any]]:
-        """Yield each load's plant with the index of its rows."""
-        for key, rows in group_by_load(load):
-            yield self.at(key), rows
+    def each(self, load: Array, respond: Callable[..., Any], *arguments: Any) -> Any:
+        """Return ``respond(muscle, *arguments)`` for rows with loads [kg], shape (n_env,)."""
+        return by_load(load, lambda key, *rest: respond(self.at(key), *rest), *arguments)
 
     @cached_property
     def mechanical_lag(self) -> float:

@@ -40,8 +40,8 @@ from baselines.core.controller import (
     Reader,
     RowController,
     Rows,
+    by_load,
     encode_action,
-    group_by_load,
     reader,
 )
 from baselines.core.entry import Entry, Spec
@@ -104,12 +104,12 @@ class TwoBranch(RowController):
         """Return the action and the next branch."""
         _, load, reference = self.reader.rows(observation)
         branch = next_branch(state, reference)
-        pressure = np.empty(len(load))
-        for key, rows in group_by_load(load):
-            grid, inflation, deflation = self._tabulated(key)
-            up = np.interp(reference[rows], grid, inflation)
-            down = np.interp(reference[rows], grid, deflation)
-            pressure[rows] = np.where(branch.inflating[rows], up, down)
+
+        def interpolated(key: float, target: Array, inflating: Rows) -> Array:
+            grid, up, down = self._tabulated(key)
+            return np.where(inflating, np.interp(target, grid, up), np.interp(target, grid, down))
+
+        pressure = by_load(load, interpolated, reference, branch.inflating)
         return encode_action(self.action_signal, pressure, observation), branch
 
     @cached_property

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.joint.loop import pi_system, pole_cancelling
-from baselines.joint.model import POLE
+from baselines.joint.model import POLE, pi_system, pole_cancelling
 from baselines.linear import ltr
 from baselines.linear.systems import discrete, double_lag, response
 from baselines.robust.loops import robust_controller

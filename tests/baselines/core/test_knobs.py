@@ -15,7 +15,7 @@ import yaml
 from baselines.core import tuned
 from baselines.core.catalogue import CONTROLLERS, PUBLISHED
 from baselines.joint import model as joint_model
-from baselines.joint.loop import make_model_loop
+from baselines.joint.model import make_model_loop
 from baselines.knee import ltr as knee_design
 from baselines.linear.pid import simc_rule
 from benchmarks.papers.joint_studies import ReducedRig
@@ -134,7 +134,7 @@ def test_knobs_of_the_elbow_scale_their_parameters():
     outer = built("elbow_allocation_early", env, pressure_loop=1.5, step=0.5).loop
     view = built("elbow_pid", env).signals.read(env.reset(seed=1)[0])
     view = view._replace(pressure=np.full_like(view.pressure, 2e5))
-    near, far = view.pressure + 1e4, np.full_like(view.pressure, outer.full)
+    near, far = view.pressure + 1e4, np.full_like(view.pressure, env.plant.full_pressure)
     np.testing.assert_allclose(
         outer.commands(view, near) - 2e5, 1.5 * (inner.commands(view, near) - 2e5)
     )

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from baselines.joint.feedback import pid_system, simc_joint
-from baselines.joint.loop import pi_system, pole_cancelling
-from baselines.joint.model import joint_delays, joint_poles, mean_time
+from baselines.joint.model import joint_delays, joint_poles, mean_time, pi_system, pole_cancelling
 from baselines.linear.pid import DELAY_PERIODS
 from baselines.linear.systems import discrete, double_lag
 from baselines.robust.loops import robust_controller

@@ -7,7 +7,7 @@ import pytest
 
 from baselines.core.controller import preview_weights
 from baselines.core.entry import Spec
-from baselines.joint.base import MAX_EXTRAPOLATION, double_pole_delays
+from baselines.joint.base import MAX_EXTRAPOLATION
 from baselines.joint.feedback import (
     make_joint_feedback,
     pid_delay,
@@ -15,8 +15,7 @@ from baselines.joint.feedback import (
     reference_filter,
     simc_joint,
 )
-from baselines.joint.loop import pi_system, pole_cancelling
-from baselines.joint.model import POLE
+from baselines.joint.model import POLE, pi_delay, pi_system, pole_cancelling
 from baselines.joint.model_following import make_model_following
 from baselines.linear.systems import discrete, double_lag
 from benchmarks.papers.joint_studies import ACTIONS, RANGE, ReducedRig
@@ -60,7 +59,7 @@ def test_extrapolation_is_bounded():
 @pytest.mark.parametrize("pole", [5.5, POLE])
 def test_loop_of_the_pi_equals_a_delay_up_to_third_order(pole):
     loop = double_lag(pole) * pi_system(pole_cancelling(pole=pole))
-    delay = double_pole_delays([pole])[0]
+    delay = pi_delay(pole)
 
     def gap(w):
         closed = loop(1j * w) / (1.0 + loop(1j * w))

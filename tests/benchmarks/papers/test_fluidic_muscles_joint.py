@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pages import Page
 
-from baselines.joint.loop import pi_system, pole_cancelling
+from baselines.joint.model import pi_system, pole_cancelling
 from baselines.robust.loops import robust_controller
 from benchmarks.papers import figures as papers
 from benchmarks.papers import joint as papers_joint
