@@ -4,14 +4,62 @@ A task is any object that pickles and has a ``key``, the digest of all inputs of
 Workers return results and only the caller stores them, so a killed worker leaves no partial file
 and a cluster needs no common disk. Stored results are the checkpoint: a resumed run executes only
 the missing tasks, with bit-identical results.
+
+When a process of this machine dies (killed, out of memory, a crash), joblib ends its whole pool.
+The tasks in execution at that moment are then repeated, each alone, which identifies a task that
+kills its process every time. The remaining tasks continue in parallel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from sweeps.worker import Act, Done, Task
+from sweeps.worker import Act, Done, Task, do, end_with
+
+ATTEMPTS = 3
+"""Attempts at a task whose process dies."""
+
+
+def run_processes(act: Act, tasks: Mapping[str, Task], jobs: int) -> Iterator[Done]:
+    """Execute tasks on ``jobs`` processes."""
+    left = dict(tasks)
+    while left:
+        started: list[str] = []
+        for done in _round(act, left, jobs, started):
+            left.pop(done.key)
+            yield done
+        for key in [key for key in started if key in left]:
+            yield _alone(act, key, left.pop(key), jobs)
+
+
+def _alone(act: Act, key: str, task: Task, jobs: int) -> Done:
+    for _ in range(ATTEMPTS - 1):
+        for done in _round(act, {key: task}, jobs, []):
+            return done
+    text = f"its worker died {ATTEMPTS} times; run it with --jobs 1 to see why"
+    return Done(key, error=text, lost=True)
+
+
+def _round(act: Act, tasks: Mapping[str, Task], jobs: int, started: list[str]) -> Iterator[Done]:
+    """Execute tasks until all are done or a process dies; ``started`` gets their keys."""
+    from joblib import Parallel, delayed, parallel_config
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    def handed_out() -> Iterator[tuple]:
+        for key, task in list(tasks.items()):
+            started.append(key)
+            yield delayed(do)(act, task, key)
+
+    driver = {"initializer": end_with, "initargs": (os.getpid(),)}
+    with parallel_config("loky", inner_max_num_threads=1, **driver):
+        # one task at a time per process, so that few are repeated when one dies
+        parallel = Parallel(jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs)
+        try:
+            yield from parallel(handed_out())
+        except BrokenProcessPool:
+            return
 
 
 @dataclass(frozen=True)
@@ -65,9 +113,5 @@ def run(act: Act, tasks: Iterable[Task], cluster: Cluster) -> Iterator[Done]:
 
         return dask_cluster.run(act, named, cluster.address)
     if cluster.jobs == 1:
-        from sweeps.worker import do
-
         return (do(act, task, key) for key, task in named.items())
-    from sweeps import processes
-
-    return processes.run(act, named, cluster.jobs)
+    return run_processes(act, named, cluster.jobs)

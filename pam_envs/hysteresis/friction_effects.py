@@ -1,14 +1,73 @@
-"""Effects on the friction of a muscle: shape of small loops, pressure dependence, first cycles."""
+"""Creep of a muscle and effects on its friction: small loops, pressure dependence, first cycles.
+
+Creep: four Kelvin-Voigt elements that follow a quantity with time constants of their own. The creep
+of ``x`` is ``sum_k c_k y_k`` with ``T_k y_k' = x - y_k``. Applied to the effective pressure the
+force creeps, applied to the length the position does.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from pam_envs.hysteresis.creep import CreepEffects
-from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed, effect
+
+ELEMENTS = 4
+"""Kelvin-Voigt elements."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CreepEffects:
+    """Creep of the effective pressure, off unless a recording shows it."""
+
+    creep_1: float = effect("1", -0.5, 2.0, "first Kelvin-Voigt compliance")
+    creep_2: float = effect("1", -0.5, 2.0, "second Kelvin-Voigt compliance")
+    creep_3: float = effect("1", -0.5, 2.0, "third Kelvin-Voigt compliance")
+    creep_4: float = effect("1", -0.5, 2.0, "fourth Kelvin-Voigt compliance")
+    creep_time_1: float = assumed(0.4, "s", 0.02, 1e4, "its time constant")
+    creep_time_2: float = assumed(2.5, "s", 0.02, 1e4, "its time constant")
+    creep_time_3: float = assumed(15.0, "s", 0.02, 1e4, "its time constant")
+    creep_time_4: float = assumed(90.0, "s", 0.02, 1e4, "its time constant")
+
+
+@kernel
+def creep_step(
+    rows: Any, fixed: Any, state: int, compliance: int, time: int, first: int, last: int,
+    value: Any,
+    width: Any, total: Any,
+) -> None:  # fmt: skip
+    """Add the creep of lanes ``first`` to ``last`` to the row ``total``.
+
+    ``state``, ``compliance`` and ``time`` are the first rows of the elements' state, compliances
+    and time constants [s]; ``value`` is the quantity that they follow, over ``width`` seconds.
+    """
+    for k in range(ELEMENTS):
+        lag = rows[state + k]
+        for j in range(first, last):
+            kept = decay(width[j] / fixed[time + k][j])
+            lag[j] = value[j] - (value[j] - lag[j]) * kept
+            total[j] = total[j] + fixed[compliance + k][j] * lag[j]
+
+
+@kernel
+def begin_creep(rows: Any, fixed: Any, j: int, state: int, compliance: int, value: float) -> float:
+    """Settle the elements of one lane at a value; return their creep."""
+    total = 0.0
+    for k in range(ELEMENTS):
+        rows[state + k][j] = value
+        total = total + fixed[compliance + k][j]
+    return total * value
+
+
+@kernel
+def creeps_on(fixed: Any, compliance: int) -> int:
+    """Return the number of lanes and elements of a tile that creep."""
+    on = 0
+    for k in range(ELEMENTS):
+        on = on + count_on(fixed[compliance + k], 0.0)
+    return on
 
 
 @dataclass(frozen=True, kw_only=True)

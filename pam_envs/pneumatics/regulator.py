@@ -1,4 +1,6 @@
-"""Proportional pressure regulator: dead time, slew limit, first-order lag, saturation.
+"""Path of the air to a muscle through a proportional pressure regulator.
+
+Dead time, slew limit, first-order lag, saturation.
 
 Its effects are those of valve, supply and line: static gain, rounded slew limit, dead band of a
 valve that closes, overlap of a spool, slower and choked exhaust, leak.
@@ -12,7 +14,8 @@ from typing import Any, ClassVar
 
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.kernels.arithmetic import TURN, count_on, decay
-from pam_envs.kernels.build import kernel
+from pam_envs.kernels.build import LANES, kernel
+from pam_envs.kernels.history import note, noted
 from pam_envs.kernels.motion import resonator_step
 from pam_envs.parameters import assumed, derived, effect, named_rows, parameter_rows, published
 
@@ -338,3 +341,59 @@ def line_effects_on(fixed: Any, effects: int) -> int:
     return count_on(fixed[effects + AIR.ring_share], 0.0) + count_on(  # type: ignore[no-any-return]
         fixed[effects + AIR.ring_flow], 0.0
     )
+
+
+@kernel
+def delay_commands(
+    rows: Any, ring: int, set_point: Any, dead: Any, step: Any, period: float, older: Any,
+    newer: Any,
+    switch: Any,
+) -> None:  # fmt: skip
+    """Write the two delayed setpoints of a control period and the time between them.
+
+    ``ring`` is the first row of the last setpoints, ``dead`` the dead times [s], ``step`` the
+    control periods and ``period`` their duration [s]. ``older`` takes effect first, then, at
+    ``switch`` [s], ``newer`` [Pa].
+    """
+    for j in range(LANES):
+        age = dead[j] / period
+        whole = min(int(age), DELAY_PERIODS)
+        switch[j] = (age - whole) * period
+        note(rows, ring, j, step[j], set_point[j])
+        newer[j] = noted(rows, ring, j, step[j], whole)
+        older[j] = noted(rows, ring, j, step[j], whole + 1)
+
+
+@kernel
+def air_step(
+    rows: Any, fixed: Any, state: int, effects: int, pressure: Any, full: Any, lag: Any, slew: Any,
+    target: Any, width: Any, own: Any, valve: int, lines: int,
+) -> None:  # fmt: skip
+    """Advance the pressures of a tile towards their targets, each by its ``width`` [s].
+
+    ``state`` and ``effects`` are the first rows of the air's state (``AIR_STATE``) and effects
+    (``AIR``); ``full`` [Pa], ``lag`` [s] and ``slew`` [Pa/s] are rows. A target below zero shuts
+    the valve. ``own`` is two rows of scratch; the second receives the pressures before. ``valve``
+    and ``lines`` are above 0 where effects of valve and supply, and of the line, are on.
+    """
+    regulated = rows[state + AIR_STATE.regulated]
+    for j in range(LANES):
+        before = regulated[j]
+        if valve > 0:
+            after = regulate_with_effects(
+                rows, fixed, j, state, effects, lag[j], slew[j], full[j], target[j], width[j]
+            )
+        else:
+            after = regulate_with_gain(
+                rows, fixed, j, state, effects, lag[j], slew[j], target[j], width[j]
+            )
+        after = after if width[j] > 0.0 else before
+        regulated[j] = after
+        own[0][j], own[1][j] = before, pressure[j]
+        pressure[j] = after
+    if lines > 0:
+        for j in range(LANES):
+            pressure[j] = line_step(
+                rows, fixed, j, state + AIR_STATE.line, effects + AIR.ring_share, own[0][j],
+                pressure[j], width[j],
+            )  # fmt: skip

@@ -10,17 +10,23 @@ from __future__ import annotations
 
 from typing import Any
 
-from pam_envs.hysteresis.creep import CreepEffects, begin_creep, creep_step
-from pam_envs.hysteresis.friction_effects import FirstCycles, newness
+from pam_envs.hysteresis.friction_effects import (
+    CreepEffects,
+    FirstCycles,
+    begin_creep,
+    creep_step,
+    newness,
+)
 from pam_envs.kernels.build import LANES, kernel, scratch
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.muscle.effects import TemperatureEffects, temperature_factor
 from pam_envs.parameters import declarations, parameter_rows, row_blocks
-from pam_envs.pneumatics.air_path import air_step, delay_commands
 from pam_envs.pneumatics.regulator import (
     AIR_STATE,
     DelayedEffects,
+    air_step,
     begin_air,
+    delay_commands,
     delayed_fraction,
     line_effects_on,
     regulator_step,

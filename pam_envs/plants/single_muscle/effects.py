@@ -16,8 +16,13 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.constants import GRAVITY
-from pam_envs.hysteresis.creep import begin_creep, creep_step, creeps_on
-from pam_envs.hysteresis.friction_effects import friction_with_effects, newness
+from pam_envs.hysteresis.friction_effects import (
+    begin_creep,
+    creep_step,
+    creeps_on,
+    friction_with_effects,
+    newness,
+)
 from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import LANES, kernel, routine, scratch
 from pam_envs.kernels.motion import damped_motion
@@ -36,9 +41,10 @@ from pam_envs.plants.core.sensors import effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.rows import STATE as S
-from pam_envs.pneumatics.air_path import air_step, delay_commands
 from pam_envs.pneumatics.regulator import (
+    air_step,
     begin_air,
+    delay_commands,
     delayed_fraction,
     line_effects_on,
     valve_effects_on,

@@ -8,8 +8,12 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.creep import CreepEffects
-from pam_envs.hysteresis.friction_effects import FirstCycles, FrictionEffects, Threshold
+from pam_envs.hysteresis.friction_effects import (
+    CreepEffects,
+    FirstCycles,
+    FrictionEffects,
+    Threshold,
+)
 from pam_envs.hysteresis.protocol import HysteresisModel, operator_of
 from pam_envs.parameters import effect, identified
 from pam_envs.plants.core.operator_component import OperatorComponent

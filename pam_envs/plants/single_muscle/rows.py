@@ -9,8 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pam_envs.hysteresis import elements as plays
-from pam_envs.hysteresis.creep import CreepEffects
-from pam_envs.hysteresis.friction_effects import FirstCycles, FrictionEffects, Threshold
+from pam_envs.hysteresis.friction_effects import (
+    CreepEffects,
+    FirstCycles,
+    FrictionEffects,
+    Threshold,
+)
 from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import GuideEffects

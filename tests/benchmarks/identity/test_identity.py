@@ -103,7 +103,7 @@ def test_docstrings_formatting_module_paths_renderer_and_diagnosis_void_no_row(
     shutil.copytree(ROOT / "tests/benchmarks/identity", tmp_path / "tests")
     for folder in ("pam_envs/plants", "pam_envs/envs", "pam_envs/tasks", "baselines/positioning"):
         reformat(tmp_path / folder)
-    move("baselines.positioning.inverse_pid", "baselines.positioning.elsewhere", tmp_path)
+    move("baselines.positioning.inverse", "baselines.positioning.elsewhere", tmp_path)
     move("pam_envs.references.trajectory", "pam_envs.references.moved", tmp_path)
     renderer = tmp_path / "pam_envs/envs/rendering/renderer.py"
     renderer.write_text(renderer.read_text() + "\nFRAME_SECONDS = 0.5\n")
