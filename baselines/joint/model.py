@@ -157,47 +157,35 @@ FREQUENCIES = np.geomspace(0.5, 60.0, 400)
 """[rad/s]."""
 
 
-class JointDynamics(NamedTuple):
-    """Equivalent pole [rad/s] and delay [s] of a joint."""
-
-    pole: float
-    delay: float
-
-
-_DYNAMICS: dict[str, tuple[JointDynamics, ...]] = {}
+_DYNAMICS: dict[str, tuple[tuple[float, float], ...]] = {}
 
 
 def joint_poles(plant: Any) -> tuple[float, ...]:
     """Return the pole of each joint [rad/s]."""
-    return tuple(pace.pole for pace in joint_dynamics(plant))
+    return tuple(pole for pole, _ in _dynamics(plant))
 
 
 def joint_delays(plant: Any) -> tuple[float, ...]:
     """Return the delay of each joint [s] for slow setpoints, without the hold."""
-    return tuple(pace.delay for pace in joint_dynamics(plant))
+    return tuple(delay for _, delay in _dynamics(plant))
 
 
-def joint_dynamics(plant: Any) -> tuple[JointDynamics, ...]:
-    """Return the dynamics of each joint, cached by plant."""
-    if plant.stages == 1:
-        return (JointDynamics(POLE, 2.0 / POLE),)
-    key = plant.digest()
-    if key not in _DYNAMICS:
-        smooth = plant.replace({"hysteresis.width": 0.0})
-        _DYNAMICS[key] = tuple(_dynamics(smooth, k) for k in range(plant.stages))
-    return _DYNAMICS[key]
-
-
-def _dynamics(plant: Any, joint: int) -> JointDynamics:
+def _dynamics(plant: Any) -> tuple[tuple[float, float], ...]:
+    """Return pole [rad/s] and delay [s] of each joint, cached by plant."""
     from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 
-    period = plant.control_period
-    commands = np.zeros((round(SECONDS / period), plant.stages))
-    commands[1:, joint] = STEP
-    pulse = np.diff(simulate_manipulator(plant, commands)["angle"][:, joint])
-    behind = np.flatnonzero(-phase(pulse, period) > 0.5 * np.pi)
-    pole = min(POLE, float(FREQUENCIES[behind[0]])) if behind.size else POLE
-    return JointDynamics(pole, mean_time(pulse, period))
+    if plant.stages == 1:
+        return ((POLE, 2.0 / POLE),)
+    key, period, found = plant.digest(), plant.control_period, []
+    for joint in range(plant.stages) if key not in _DYNAMICS else ():
+        commands = np.zeros((round(SECONDS / period), plant.stages))
+        commands[1:, joint] = STEP
+        smooth = plant.replace({"hysteresis.width": 0.0})
+        pulse = np.diff(simulate_manipulator(smooth, commands)["angle"][:, joint])
+        behind = np.flatnonzero(-phase(pulse, period) > 0.5 * np.pi)
+        pole = min(POLE, float(FREQUENCIES[behind[0]])) if behind.size else POLE
+        found.append((pole, mean_time(pulse, period)))
+    return _DYNAMICS.setdefault(key, tuple(found))
 
 
 def mean_time(pulse: Array, period: float) -> float:

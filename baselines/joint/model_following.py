@@ -8,8 +8,9 @@ fluidic_muscles, section 4, Fig. 11:
 
 The model loop has no disturbance: its PI (pole cancellation, ``D = 1/sqrt(2)``) is designed for
 tracking only. The disturbance loop compares the joint with the model instead of the reference, and
-is designed for disturbance rejection only (:mod:`baselines.robust.loops`). With an exact inverse
-and an exact model of the motion the joint equals its model, and the disturbance loop is at rest.
+is designed for disturbance rejection only (:mod:`baselines.robust.requirements`). With an exact
+inverse and an exact model of the motion the joint equals its model, and the disturbance loop is at
+rest.
 
 ``H^-1`` is the exact recursive inverse of the identified hysteresis (:mod:`baselines.joint.model`),
 for the history of commands; without it ``u = (u_mod + u_dis) / K``. ``u_mod`` is limited to the
@@ -44,7 +45,7 @@ from baselines.joint.model import (
 )
 from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.linear.systems import DiscreteSystem
-from baselines.robust.loops import Kind, robust_controller
+from baselines.robust.requirements import Kind, robust_controller
 from pam_envs.hysteresis.protocol import RowsState
 
 KNOBS: Bounds = {"damping": (0.5, 1.5), "disturbance": (0.5, 2.0)}

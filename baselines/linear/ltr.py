@@ -21,7 +21,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
 
 from baselines.core.controller import Array
 from baselines.linear.systems import (
@@ -151,31 +150,20 @@ def loop_figures(loop_response: Response, low: float = 1e-2, high: float = 1e4) 
     if not len(crossings):
         raise ValueError(f"the loop gain does not fall through 1 up to {high} rad/s: widen high")
     margins = np.radians((phases + 180.0) % 360.0 - 180.0)
-    target = abs(closed[0]) / math.sqrt(2.0)
-
-    def tracking(w: float) -> float:
-        value = complex(loop_response(np.array([w]))[0])
-        return abs(value / (1.0 + value))
-
     sizes = np.abs(closed)
-    falls = np.flatnonzero((sizes[:-1] >= target) & (sizes[1:] < target))
-    bands = [
-        brentq(lambda w: tracking(w) - target, grid[k], grid[k + 1], xtol=1e-12) for k in falls[:1]
-    ]
-    k = int(np.clip(np.argmax(sizes), 1, POINTS - 2))
-    peak = minimize_scalar(
-        lambda x: -tracking(math.exp(x)),
-        bounds=(math.log(grid[k - 1]), math.log(grid[k + 1])),
-        method="bounded",
-    )
+    target = float(sizes[0]) / math.sqrt(2.0)
+    falls, bandwidth = np.flatnonzero((sizes[:-1] >= target) & (sizes[1:] < target)), math.inf
+    for k in falls[:1]:
+        share = (sizes[k] - target) / (sizes[k] - sizes[k + 1])
+        bandwidth = float(grid[k] * (grid[k + 1] / grid[k]) ** share)
     return LoopFigures(
         crossover=float(np.max(crossings)),
         phase_margin=float(np.min(margins)),
         delay_margin=float(np.min(margins / crossings)),
         gain_margin=float(np.min(gains[gains > 1.0], initial=math.inf)),
-        bandwidth=float(bands[0]) if bands else math.inf,
+        bandwidth=bandwidth,
         peak_sensitivity=1.0 / float(np.min(np.append(distances, np.abs(1.0 + loop)))),
-        peak_tracking=max(float(-peak.fun), float(sizes[k])),
+        peak_tracking=float(np.max(sizes)),
     )
 
 

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from baselines.joint.model import POLE, pi_system, pole_cancelling
 from baselines.linear import ltr
 from baselines.linear.systems import discrete, double_lag, response
-from baselines.robust.loops import robust_controller
-from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
+from baselines.robust.requirements import FREQUENCIES, RobustDesign, robust_controller, sensitivity
 from benchmarks.papers.joint_hysteresis import inverse_error, verdicts, width_ratio
 from benchmarks.papers.joint_studies import (
     CASES,

@@ -19,7 +19,6 @@ import contextlib
 import dataclasses
 import hashlib
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
@@ -116,9 +115,14 @@ class Rig:
     def __post_init__(self) -> None:
         """Check every value; messages use the file's units."""
         for field, bounds in NUMBERS.items():
-            value = getattr(self, field)
-            if value is not None:
-                _check_number(value / bounds.scale, bounds)
+            if getattr(self, field) is None:
+                continue
+            value, slack = getattr(self, field) / bounds.scale, 1e-9 * bounds.high  # from SI
+            _require(
+                bounds.low - slack <= value <= bounds.high + slack,
+                f"{bounds.key} = {value:g} {bounds.unit} is outside [{bounds.low:g}, "
+                f"{bounds.high:g}] {bounds.unit}; correct the value or its unit, or leave it out",
+            )
         _require(
             self.load in get_args(Load),
             f"load is {self.load!r}; choose hanging_mass or constant_force (the load in newton "
@@ -129,8 +133,27 @@ class Rig:
             f"history.cycles_since_rest = {self.cycles_since_rest} is outside [0, 1000000]; count "
             "the cycles since the muscle last rested",
         )
-        _check_groups(self.repeats)
-        _check_tolerance(self.tolerance)
+        named = [label for group in self.repeats for label in group]
+        for group in self.repeats:
+            _require(
+                len(group) >= 2,
+                f"repeats holds the group {list(group)!r}; name at least two segments that repeat "
+                "one another, or leave the group out",
+            )
+        for label in named:
+            once = named.count(label) == 1
+            _require(once, f"repeats names the segment {label!r} twice; name it once")
+        for name, value in self.tolerance.items():
+            _require(
+                name.count(".") == 1,
+                f"tolerance names {name!r}; name a parameter of the plant with its component, for "
+                "example mass.load",
+            )
+            _require(
+                0.0 < value <= 1.0,
+                f"tolerance of {name} = {value:g} is outside (0, 1]; it is relative: give 0.02 for "
+                "two per cent",
+            )
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Rig:
@@ -169,9 +192,8 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
     for field, bounds in NUMBERS.items():
         section, _, key = bounds.key.partition(".")
         if sections[section].get(key) is not None:
-            value = _number(sections[section][key], bounds.key, bounds.unit)
-            _check_number(value, bounds)
-            given[field] = value * bounds.scale
+            number = _number(sections[section][key], bounds.key, bounds.unit)
+            given[field] = number * bounds.scale
     if data.get("load") is not None:
         given["load"] = data["load"]
     given |= _history(sections["history"])
@@ -210,15 +232,6 @@ def _number(value: Any, key: str, unit: str) -> float:
     return float(value)
 
 
-def _check_number(value: float, bounds: Bounds) -> None:
-    slack = 1e-9 * bounds.high  # from SI and back
-    _require(
-        math.isfinite(value) and bounds.low - slack <= value <= bounds.high + slack,
-        f"{bounds.key} = {value:g} {bounds.unit} is outside [{bounds.low:g}, {bounds.high:g}] "
-        f"{bounds.unit}; correct the value or its unit, or leave it out",
-    )
-
-
 def _history(section: Mapping[str, Any]) -> dict[str, Any]:
     given = {key: value for key, value in section.items() if value is not None}
     for key, kind, what in (
@@ -247,19 +260,6 @@ def _repeats(value: Any) -> tuple[tuple[str, ...], ...]:
     return tuple(_labels(group, "each group of repeats") for group in value or [])
 
 
-def _check_groups(repeats: tuple[tuple[str, ...], ...]) -> None:
-    named = [label for group in repeats for label in group]
-    for group in repeats:
-        _require(
-            len(group) >= 2,
-            f"repeats holds the group {list(group)!r}; name at least two segments that repeat one "
-            "another, or leave the group out",
-        )
-    for label in named:
-        once = named.count(label) == 1
-        _require(once, f"repeats names the segment {label!r} twice; name it once")
-
-
 def _tolerance(value: Any) -> dict[str, float]:
     _require(
         value is None or isinstance(value, Mapping),
@@ -268,17 +268,3 @@ def _tolerance(value: Any) -> dict[str, float]:
     )
     given = (value or {}).items()
     return {str(k): _number(v, f"tolerance of {k}", "parts of one") for k, v in given}
-
-
-def _check_tolerance(tolerance: Mapping[str, float]) -> None:
-    for name, value in tolerance.items():
-        _require(
-            name.count(".") == 1,
-            f"tolerance names {name!r}; name a parameter of the plant with its component, for "
-            "example mass.load",
-        )
-        _require(
-            0.0 < value <= 1.0,
-            f"tolerance of {name} = {value:g} is outside (0, 1]; it is relative: give 0.02 for two "
-            "per cent",
-        )

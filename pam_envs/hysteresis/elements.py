@@ -195,14 +195,3 @@ class ParallelElements:
         y = np.empty_like(values)
         simulate_elements(values, rows, *self.parts, self.slips, y)
         return y, rows[:, 0]
-
-    def dissipated(self, before: ArrayLike, after: ArrayLike) -> Array:
-        """Return the work lost between two states, ``sum(gain * threshold * abs(change))``.
-
-        Between the two states the input must have moved monotonically, or reversed by too little to
-        move a play back. Summed over a closed cycle it is the loop area, the integral of ``x dy``
-        of plays and of ``y dx`` of stops; never negative.
-        """
-        moved = np.abs(np.asarray(after, dtype=float) - np.asarray(before, dtype=float))
-        thresholds, gains, _ = self.parts
-        return moved @ (gains * thresholds)

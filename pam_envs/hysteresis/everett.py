@@ -43,11 +43,6 @@ def everett(a: float, b: float, table: Any) -> float:
     return e00 + along + s * t * ((e00 + e11) - (e10 + e01))
 
 
-def grid(low: float, high: float, levels: int) -> Array:
-    """Return the ``levels`` inputs of the table's rows and columns."""
-    return np.linspace(low, high, levels)
-
-
 def table_from_weights(weights: ArrayLike) -> Array:
     """Return the table, shape (n, n), of relay weights per cell, shape (n - 1, n - 1).
 

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.checks import check_not_negative, check_thresholds, floats, width_of
 from pam_envs.hysteresis.elements import ParallelElements, plays_lag, plays_peek, plays_step
-from pam_envs.hysteresis.everett import grid, play_table
+from pam_envs.hysteresis.everett import play_table
 from pam_envs.hysteresis.protocol import (
     ELEMENTS,
     HysteresisModel,
@@ -121,7 +121,7 @@ class PlayOperator(ParallelElements, HysteresisModel):
     ) -> tuple[Array, float]:
         """Return the Everett map, shape (levels, levels), and the output at the start."""
         output = self.total_slope * low + self.friction if start == "low" else 0.0
-        return play_table(self, grid(low, high, levels)), output
+        return play_table(self, np.linspace(low, high, levels)), output
 
     # --- inverse --------------------------------------------------------------------------------
 
@@ -258,12 +258,6 @@ class MaxwellSlip(ParallelElements):
     def total_slope(self) -> float:
         """The stiffness where every element slips: that of large amplitudes."""
         return self.spring
-
-    def stored_energy(self, x: ArrayLike, state: ArrayLike) -> Array:
-        """Return the elastic energy at input ``x``, shape (...), with slip positions (..., n)."""
-        x = np.asarray(x, dtype=float)
-        stops = x[..., None] - np.asarray(state, dtype=float)
-        return 0.5 * self.spring * x**2 + 0.5 * (stops**2 @ np.array(self.stiffnesses))
 
     def scaled(self, width: float) -> MaxwellSlip:
         """Return this model with its hysteresis ``width`` times as wide, 0 for the spring alone."""

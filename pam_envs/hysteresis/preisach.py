@@ -206,7 +206,7 @@ class Preisach(HysteresisModel):
     @cached_property
     def levels(self) -> Array:
         """The inputs of the map's rows and columns, shape (n,)."""
-        return maps.grid(self.low, self.high, len(self.table))
+        return np.linspace(self.low, self.high, len(self.table))
 
     @cached_property
     def weights(self) -> Array:

@@ -193,7 +193,7 @@ def preisach_from_curves(
     ValueError
         If a level has no curve (the message names it), or a curve does not reach ``low``.
     """
-    points = maps.grid(low, high, levels)
+    points = np.linspace(low, high, levels)
     rising = np.zeros((levels, levels))
     found = np.zeros(levels, dtype=bool)
     for x, y in curves:

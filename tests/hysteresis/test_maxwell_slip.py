@@ -210,6 +210,12 @@ def work(force: Array, x: Array) -> float:
     return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x)))
 
 
+def dissipated(model, before, after) -> float:
+    """Return the work lost between two states, the input having moved monotonically."""
+    thresholds, gains, _ = model.parts
+    return float(np.abs(after - before) @ (gains * thresholds))
+
+
 @few
 @given(steps_on_lattice, st.lists(st.floats(0.0, 3.0), min_size=3, max_size=3))
 def test_work_is_stored_or_dissipated(turns, stiffnesses):
@@ -218,11 +224,11 @@ def test_work_is_stored_or_dissipated(turns, stiffnesses):
     state, force, lost = model.initial_state(), [], 0.0
     for value in x:
         f, after = model.step(value, state)
-        step_loss = model.dissipated(state, after)
+        step_loss = dissipated(model, state, after)
         assert step_loss >= 0.0
         force.append(float(f))
         lost, state = lost + step_loss, after
-    stored = model.stored_energy(x[-1], state)
+    stored = 0.5 * model.spring * x[-1] ** 2 + 0.5 * (x[-1] - state) ** 2 @ stiffnesses
     total = work(np.array(force), x)
     assert total == pytest.approx(lost + stored, abs=1e-10)
 
@@ -237,7 +243,7 @@ def test_closed_cycles_lose_their_loop_area(turns, weights):
     state, lost, y = first, 0.0, [operator.step(x[0], first)[0]]
     for value in x[1:]:
         out, after = operator.step(value, state)
-        lost += operator.dissipated(state, after)
+        lost += dissipated(operator, state, after)
         y.append(out)
         state = after
     np.testing.assert_array_equal(state, first)

@@ -16,8 +16,7 @@ from baselines.joint.feedback import pid_system, simc_joint
 from baselines.joint.model import joint_delays, joint_poles, mean_time, pi_system, pole_cancelling
 from baselines.linear.pid import DELAY_PERIODS
 from baselines.linear.systems import discrete, double_lag
-from baselines.robust.loops import robust_controller
-from baselines.robust.requirements import FREQUENCIES, RobustDesign
+from baselines.robust.requirements import FREQUENCIES, RobustDesign, robust_controller
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 

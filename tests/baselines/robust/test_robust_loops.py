@@ -10,8 +10,13 @@ import pytest
 from baselines.linear.ltr import integrator
 from baselines.linear.systems import discrete, from_roots, response
 from baselines.robust import synthesis
-from baselines.robust.loops import frozen, robust_controller
-from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
+from baselines.robust.requirements import (
+    FREQUENCIES,
+    RobustDesign,
+    frozen,
+    robust_controller,
+    sensitivity,
+)
 from baselines.robust.synthesis import residualised, split, without_fast
 
 DESIGN = RobustDesign()

@@ -11,7 +11,7 @@ import pytest
 from pages import Page
 
 from baselines.joint.model import pi_system, pole_cancelling
-from baselines.robust.loops import robust_controller
+from baselines.robust.requirements import robust_controller
 from benchmarks.papers import figures as papers
 from benchmarks.papers import joint as papers_joint
 from benchmarks.papers import joint_studies as studies
