@@ -41,49 +41,37 @@ KNOBS: Bounds = {"lead": (0.25, 4.0)}
 
 
 @dataclass(frozen=True)
-class StiffnessPreview:
-    """Interpolation of the previewed reference stiffness [N/m] at a later time.
-
-    It holds readers of the references with their previews (of the angle only in gait environments),
-    and the weights of their samples.
-    """
-
-    observer: KneeObserver
-    tension: Reader
-    angle: Reader | None
-    weights: Array
-
-    def reference(self, observation: ArrayLike) -> Array:
-        """Return the reference stiffness [N/m], shape (n_env,)."""
-        samples, nominal = self.tension.rows(observation), self.observer.nominal
-        if not self.observer.stiffness:
-            planned = self.angle.rows(observation) if self.angle else nominal.angle_of(samples)
-            samples = samples / nominal.stretch(planned)
-        return np.add.reduce(self.weights[:, None] * samples, axis=0)
-
-    def free(self, angle: Reader, observation: ArrayLike) -> Array:
-        """Return the stiffness [N/m] of zero wire torque on the knee, shape (n_env,)."""
-        angles, nominal = angle.rows(observation), self.observer.nominal
-        samples = nominal.free_tension(angles) / nominal.stretch(angles)
-        return np.add.reduce(self.weights[:, None] * samples, axis=0)
-
-
-@dataclass(frozen=True)
 class Forward:
-    """Feedforward, its reference previewed or present; its state is the nominal hysteresis."""
+    """Feedforward, its reference previewed or present; its state is the nominal hysteresis.
+
+    With a preview it holds readers of the references with their previews (of the angle only in gait
+    environments), and the weights of their samples.
+    """
 
     kind: Kind
     observer: KneeObserver
-    preview: StiffnessPreview | None
+    tension: Reader | None = None
+    angle: Reader | None = None
+    weights: Array | None = None
 
     def tensions(self, view: KneeView, observation: ArrayLike) -> tuple[Array, Array]:
-        """Return the reference tension, and that of zero wire torque on the knee [N]."""
-        free = self.observer.nominal.free_tension(view.angle)
-        if self.preview is None:
+        """Return the reference tension, and that of zero wire torque on the knee [N].
+
+        With a preview both are those of the stiffness [N/m] interpolated at the later time.
+        """
+        nominal = self.observer.nominal
+        free = nominal.free_tension(view.angle)
+        if self.tension is None or self.weights is None:
             return view.reference, free
-        if self.preview.angle is not None:
-            free = self.preview.free(self.preview.angle, observation) * view.stretch
-        return self.preview.reference(observation) * view.stretch, free
+        samples, weights = self.tension.rows(observation), self.weights[:, None]
+        angles = None if self.angle is None else self.angle.rows(observation)
+        if angles is not None:
+            later = nominal.free_tension(angles) / nominal.stretch(angles)
+            free = np.add.reduce(weights * later, axis=0) * view.stretch
+        if not self.observer.stiffness:
+            planned = nominal.angle_of(samples) if angles is None else angles
+            samples = samples / nominal.stretch(planned)
+        return np.add.reduce(weights * samples, axis=0) * view.stretch, free
 
     def start(self, pressure: Array) -> RowsState:
         """Return the state after inflation to a pressure [Pa], shape (n_env,)."""
@@ -105,19 +93,19 @@ class Forward:
 
 def make_forward(spec: Spec[KneeOrthosis], kind: Kind, preview: bool) -> Forward:
     """Return the feedforward; a preview is by the regulator's lag and half a control period."""
-    observer, ahead, signals = make_knee_observer(spec), None, spec.signals
-    if preview:
-        names = preview_names("reference", signals)
-        delay = spec.plant.regulator.time_constant + 0.5 * spec.plant.control_period
-        times = [signals[name].ahead for name in names]
-        angles = preview_names("angle_reference", signals)
-        ahead = StiffnessPreview(
-            observer,
-            reader(signals, names),
-            reader(signals, angles) if observer.gait else None,
-            preview_weights(times, spec.knob("lead") * delay),
-        )
-    return Forward(kind, observer, ahead)
+    observer, signals = make_knee_observer(spec), spec.signals
+    if not preview:
+        return Forward(kind, observer)
+    names = preview_names("reference", signals)
+    delay = spec.plant.regulator.time_constant + 0.5 * spec.plant.control_period
+    times = [signals[name].ahead for name in names]
+    return Forward(
+        kind,
+        observer,
+        reader(signals, names),
+        reader(signals, preview_names("angle_reference", signals)) if observer.gait else None,
+        preview_weights(times, spec.knob("lead") * delay),
+    )
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,7 @@ def test_knobs_of_the_knee_scale_their_parameters():
     tame = knee_design.design(env.plant, "tension", knobs={"recovery": 10.0}).figures
     assert fast.bandwidth > 1.5 * plain.bandwidth
     assert tame.bandwidth < plain.bandwidth
-    aheads = [built("knee_inverse_ahead", env, lead=k).forward.preview.weights for k in (1.0, 2.0)]
+    aheads = [built("knee_inverse_ahead", env, lead=k).forward.weights for k in (1.0, 2.0)]
     times = np.arange(len(aheads[0]))
     assert aheads[1] @ times == pytest.approx(2.0 * (aheads[0] @ times))
     loops = [built("knee_inverse_ltr", env, bandwidth=k).tension for k in (1.0, 2.0)]
