@@ -29,12 +29,7 @@ from numpy.typing import ArrayLike
 
 from baselines.core.controller import Array, Prediction
 from baselines.core.entry import AS_DESIGNED, Knobs, Spec
-from baselines.joint.base import (
-    JOINT_ENTRY,
-    PREVIEW_KNOBS,
-    JointController,
-    make_parts,
-)
+from baselines.joint.base import JOINT_ENTRY, PREVIEW_KNOBS, JointController, make_parts
 from baselines.joint.model import (
     DAMPING,
     SLOW_DAMPING,

@@ -21,15 +21,7 @@ from numpy.typing import ArrayLike
 
 from baselines.core.controller import Reader, reader
 from baselines.core.entry import AS_DESIGNED, Bounds, Entry, Knobs, Spec
-from baselines.linear.pid import (
-    DELAY_PERIODS,
-    FILTER,
-    PID_KNOBS,
-    Gains,
-    Pid,
-    PidView,
-    simc_rule,
-)
+from baselines.linear.pid import DELAY_PERIODS, FILTER, PID_KNOBS, Gains, Pid, PidView, simc_rule
 from baselines.positioning.nominal import Nominal
 from pam_envs.parameters import Signal
 from pam_envs.plants.single_muscle.plant import SingleMuscle
