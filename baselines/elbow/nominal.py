@@ -125,7 +125,7 @@ def pressures_for(
 ) -> tuple[Array, Array]:
     """Return the pressures [Pa] of bundles a and b of a nominal orthosis, shape (n_env,).
 
-    References and angle are in SI; ``losses`` are the friction losses of the bundles' shapes [m^2].
+    References and angle are in SI; ``friction`` is the loss of the bundles' shapes [m^2].
     The limits are the lowest and highest pressures [Pa], shapes (2, n_env); default: the whole
     range.
     """

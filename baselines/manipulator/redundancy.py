@@ -4,8 +4,8 @@ fluidic_muscles, section 2: of all joint angles of a pose, those that minimise t
 which keeps joints away from their limits, or the sum of their squares. A period starts from the
 angles and multipliers of the last one, so that a few Newton iterations suffice; an episode starts
 from the sensed angles. A pose out of reach, or without a direction, leaves the setpoints unchanged
-and is counted. :func:`pam_envs.mechanics.redundancy.resolve` plans a whole path, and raises an
-error for such a pose.
+and is counted. :func:`~pam_envs.mechanics.redundancy.resolution.resolve` plans a whole path, and
+raises an error for such a pose.
 """
 
 from __future__ import annotations
