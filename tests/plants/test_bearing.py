@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from pam_envs.plants.antagonistic_joint.bearing import UnbearableLoad, bearable_payload, check_borne
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
+from pam_envs.plants.antagonistic_joint.statics import UnbearableLoad, bearable_payload, check_borne
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 

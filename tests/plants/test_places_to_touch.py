@@ -57,7 +57,7 @@ from pam_envs.plants.core.muscle_path import begin_path, path_step
 from pam_envs.plants.core.rollout import loop_for, simulate_plants
 from pam_envs.plants.core.rows import signal_rows
 from pam_envs.plants.core.sensors import effect_kernels, read_sensors, reading_rows
-from pam_envs.plants.core.tiles import drives_of
+from pam_envs.plants.core.rollout import drives_of
 from pam_envs.pneumatics.regulator import regulator_step
 
 OUTPUTS = signal_rows(K, "pressure force")

@@ -7,7 +7,7 @@ from types import SimpleNamespace as Plant
 import numpy as np
 import pytest
 
-from pam_envs.plants.core.tiles import first_of, in_tiles
+from pam_envs.plants.core.rollout import first_of, in_tiles
 
 
 def plant(kind: str, substeps: int = 4) -> Plant:

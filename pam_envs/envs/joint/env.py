@@ -46,8 +46,8 @@ from pam_envs.envs.core.arguments import Common, Randomisation, environment_argu
 from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose, masses_of
 from pam_envs.envs.joint import kernels as L
 from pam_envs.plants.antagonistic_joint import rows as R
-from pam_envs.plants.antagonistic_joint.bearing import check_borne
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.antagonistic_joint.statics import check_borne
 from pam_envs.references.trajectory import FAMILIES, SAMPLES, sines_needed
 from pam_envs.tasks.joint_tracking import JointTracking
 

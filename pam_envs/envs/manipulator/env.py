@@ -52,7 +52,7 @@ from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, co
 from pam_envs.envs.manipulator.kernels import kernels_for
 from pam_envs.envs.manipulator.layout import MODES, POSE, joint_names, muscle_names
 from pam_envs.envs.manipulator.paths import paths_for
-from pam_envs.plants.antagonistic_joint.bearing import bearable_payload, check_borne
+from pam_envs.plants.antagonistic_joint.statics import bearable_payload, check_borne
 from pam_envs.plants.redundant_manipulator import rows as R
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.tasks.joint_tracking import PathTracking

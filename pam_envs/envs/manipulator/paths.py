@@ -14,7 +14,7 @@ from pam_envs.kernels.build import interpreted
 from pam_envs.mechanics.redundancy.resolution import UnreachablePose, resolve
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.mechanics.serial_chain.kernels import place_chain, pointing_row, tip_row, work_rows
-from pam_envs.plants.antagonistic_joint.bearing import bearable_payload
+from pam_envs.plants.antagonistic_joint.statics import bearable_payload
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.references.path import PATHS, draw_ends, joint_line
 

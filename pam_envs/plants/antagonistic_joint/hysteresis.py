@@ -21,7 +21,7 @@ from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.protocol import preset
 from pam_envs.parameters import assumed
-from pam_envs.plants.core.operator_component import OperatorComponent
+from pam_envs.plants.core.plant import OperatorComponent
 
 WIDEST = 0.22
 """Contraction on either side of the straight joint's that a Preisach hysteresis spans."""

@@ -20,10 +20,18 @@ from pam_envs.plants.antagonistic_joint.step import (
     start_hysteresis,
 )
 from pam_envs.plants.core.plant import Plant
-from pam_envs.plants.core.rollout import BEGIN, REST, Loop, loop_for, plants_of, simulate_plants
+from pam_envs.plants.core.rollout import (
+    BEGIN,
+    REST,
+    Loop,
+    drives_of,
+    first_of,
+    loop_for,
+    plants_of,
+    simulate_plants,
+)
 from pam_envs.plants.core.rows import signal_rows
 from pam_envs.plants.core.sensors import reading_rows
-from pam_envs.plants.core.tiles import drives_of, first_of
 
 if TYPE_CHECKING:
     from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint

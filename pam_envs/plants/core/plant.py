@@ -14,16 +14,49 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.protocol import HysteresisModel, Usage, tables_of
+from pam_envs.hysteresis.protocol import (
+    HysteresisModel,
+    Usage,
+    choice_of,
+    operator_of,
+    tables_of,
+)
 from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
-from pam_envs.plants.core.operator_component import OperatorComponent
 from pam_envs.wording import near
 
 
 class UnstableParameters(ValueError):
     """Parameters whose motion the sub-steps cannot follow."""
+
+
+@dataclass(frozen=True)
+class OperatorComponent:
+    """Hysteresis of a plant.
+
+    Attributes
+    ----------
+    operator : HysteresisModel or None
+        The operator; None for no hysteresis.
+    """
+
+    operator: HysteresisModel | None = None
+
+    @property
+    def model(self) -> HysteresisModel:
+        """The operator, the identity in place of None."""
+        return operator_of(self.operator)
+
+    @property
+    def kind(self) -> str:
+        """Registered kind of the operator, which selects the kernels."""
+        return self.model.kind
+
+    @property
+    def choice(self) -> str:
+        """Value of ``hysteresis=`` that the operator belongs to."""
+        return choice_of(self.operator)
 
 
 @dataclass(frozen=True)

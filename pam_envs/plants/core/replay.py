@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.plants.core.plant import Plant
-from pam_envs.plants.core.rollout import BEGIN, call, run
-from pam_envs.plants.core.tiles import drives_of
+from pam_envs.plants.core.rollout import BEGIN, call, drives_of, run
 
 Array = NDArray[np.float64]
 

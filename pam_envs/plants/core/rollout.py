@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from operator import attrgetter
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +26,6 @@ from pam_envs.kernels.build import (
     threads,
     tile_view,
 )
-from pam_envs.plants.core.tiles import first_of, in_tiles
 
 BEGIN, REST, REZERO = 1, 2, 4
 """Flags of a control period: restart; come to rest instead of advancing; zero the sensor."""
@@ -44,6 +44,7 @@ plant_begin: Any = None
 advance: Any = None
 
 Array = NDArray[np.float64]
+P = TypeVar("P")
 
 
 @kernel
@@ -251,7 +252,7 @@ def run(
     columns : array_like, shape (n, n_parameters)
         Parameter sets; the last serves all further columns of ``drives``, up to ``plants``.
     drives : ndarray, shape (channels, T, n or 1)
-        See :func:`pam_envs.plants.core.tiles.drives_of`.
+        See :func:`drives_of`.
     flags : array_like of int, shape (T,), optional
         Default: begin with the first control period.
     before : bool
@@ -334,3 +335,39 @@ def simulate_plants(
 def plants_of(plants: Any) -> list[Any]:
     """Return one plant, or several, as a list."""
     return [plants] if hasattr(plants, "parameter_rows") else list(plants)
+
+
+def first_of(plants: Sequence[P], *words: str) -> P:
+    """Return the first of some plants that run side by side.
+
+    ``words`` are attributes that need to be the same in all of them, since they choose the code.
+    """
+    if not plants:
+        raise ValueError("no plants are given; give one or more")
+    makes = {tuple(attrgetter(word)(plant) for word in words) for plant in plants}
+    if len(makes) != 1:
+        raise ValueError(
+            f"plants that are simulated together need to be of one variant ({', '.join(words)}), "
+            f"got {makes}"
+        )
+    return plants[0]
+
+
+def in_tiles(parameters: ArrayLike, plants: int, lanes: int) -> Array:
+    """Return parameter sets, shape (n, n_parameters), as (tiles, n_parameters, lanes).
+
+    The last set is repeated up to ``plants`` columns, and to fill the last tile.
+    """
+    columns: NDArray[Any] = np.asarray(parameters, np.float64)
+    tiles = -(-plants // lanes)
+    columns = columns[np.minimum(np.arange(tiles * lanes), len(columns) - 1)]
+    return np.ascontiguousarray(columns.T.reshape(-1, tiles, lanes).transpose(1, 0, 2))
+
+
+def drives_of(channels: Sequence[ArrayLike]) -> Array:
+    """Return channels side by side, shape (channels, T, n); each is (), (T,) or (T, n)."""
+    given = [np.asarray(channel, np.float64) for channel in channels]
+    periods = max(len(c) if c.ndim else 1 for c in given)
+    columns = max(c.shape[1] if c.ndim == 2 else 1 for c in given)
+    shaped = [c[:, None] if c.ndim == 1 else c for c in given]
+    return np.array([np.broadcast_to(c, (periods, columns)) for c in shaped])

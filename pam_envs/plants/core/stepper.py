@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import LANES
-from pam_envs.plants.core.rollout import BEGIN, call
-from pam_envs.plants.core.tiles import drives_of, in_tiles
+from pam_envs.plants.core.rollout import BEGIN, call, drives_of, in_tiles
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rollout import loop_of

@@ -34,7 +34,7 @@ from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import preset
 from pam_envs.parameters import published
 from pam_envs.plants.antagonistic_joint.hysteresis import PLAYS
-from pam_envs.plants.core.operator_component import OperatorComponent
+from pam_envs.plants.core.plant import OperatorComponent
 
 SMALLEST, LARGEST = 6e-4, 9e-3
 """Thresholds of the preset's plays [m]: 0.15 % and 2.3 % of the nominal length."""

@@ -10,10 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import COMPILED, LANES, kernel
-from pam_envs.plants.core.rollout import Loop, loop_for, plants_of, simulate_plants
+from pam_envs.plants.core.rollout import (
+    Loop,
+    drives_of,
+    first_of,
+    loop_for,
+    plants_of,
+    simulate_plants,
+)
 from pam_envs.plants.core.rows import signal_rows
 from pam_envs.plants.core.sensors import reading_rows
-from pam_envs.plants.core.tiles import drives_of, first_of
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.plants.elbow_orthosis.step import (

@@ -9,7 +9,7 @@ from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.modified_maxwell_slip import even_model
 from pam_envs.hysteresis.protocol import HysteresisModel, preset
 from pam_envs.parameters import assumed
-from pam_envs.plants.core.operator_component import OperatorComponent
+from pam_envs.plants.core.plant import OperatorComponent
 
 FULL_PRESSURE = 4.5e5
 FULL_STIFFNESS = 7110.0

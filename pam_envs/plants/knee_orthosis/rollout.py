@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import COMPILED, LANES, kernel
-from pam_envs.plants.core.rollout import Loop, loop_for, simulate_plants
+from pam_envs.plants.core.rollout import Loop, drives_of, loop_for, simulate_plants
 from pam_envs.plants.core.rows import signal_rows
 from pam_envs.plants.core.sensors import reading_rows
-from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.knee_orthosis.step import (

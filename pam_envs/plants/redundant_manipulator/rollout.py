@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.mechanics.serial_chain.kernels import N_STAGES, parameter_rows
 from pam_envs.plants.antagonistic_joint.pair import command
-from pam_envs.plants.core.rollout import Loop, loop_for, run
+from pam_envs.plants.core.rollout import Loop, drives_of, loop_for, run
 from pam_envs.plants.core.rows import signal_rows
 from pam_envs.plants.core.sensors import reading_rows
-from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.step import (

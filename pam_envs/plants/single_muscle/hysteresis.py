@@ -16,7 +16,7 @@ from pam_envs.hysteresis.friction_effects import (
 )
 from pam_envs.hysteresis.protocol import HysteresisModel, operator_of
 from pam_envs.parameters import effect, identified
-from pam_envs.plants.core.operator_component import OperatorComponent
+from pam_envs.plants.core.plant import OperatorComponent
 
 Kind: TypeAlias = str
 """A value of ``hysteresis=``, one of :func:`pam_envs.hysteresis.protocol.kinds`."""

@@ -13,8 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.plants.core.rollout import BEGIN, REZERO, run
-from pam_envs.plants.core.tiles import drives_of
+from pam_envs.plants.core.rollout import BEGIN, REZERO, drives_of, run
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rollout import loop_of

@@ -14,9 +14,8 @@ from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.kernels.motion import oscillator_wide
-from pam_envs.plants.core.rollout import Loop, loop_for, run
+from pam_envs.plants.core.rollout import Loop, drives_of, loop_for, run
 from pam_envs.plants.core.sensors import reading_rows
-from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import (
     EFFECTS_AT,

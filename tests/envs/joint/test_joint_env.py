@@ -9,8 +9,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pam_envs.plants.antagonistic_joint.bearing import UnbearableLoad
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.antagonistic_joint.statics import UnbearableLoad
 from tests.envs.cases import record
 
 NAME = "PAM/AntagonisticJoint-v0"

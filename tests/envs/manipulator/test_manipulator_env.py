@@ -13,7 +13,7 @@ from pam_envs.envs.manipulator.layout import POSE
 from pam_envs.envs.manipulator.paths import DRAWN, USUAL_PAYLOAD, paths_for
 from pam_envs.mechanics.redundancy.resolution import UnreachablePose
 from pam_envs.mechanics.serial_chain.chain import SerialChain
-from pam_envs.plants.antagonistic_joint.bearing import UnbearableLoad, bearable_payload
+from pam_envs.plants.antagonistic_joint.statics import UnbearableLoad, bearable_payload
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.references.path import PATHS
 
