@@ -44,12 +44,6 @@ class BraceTracking:
 
 
 @kernel
-def gated_reward(error: float, gate: float, scale: float, weight: float) -> float:
-    """Return the reward for an error while ``gate`` is 1: linear, at most 0."""
-    return -weight * gate * abs(error) / scale
-
-
-@kernel
 def over_assistance(torque: float, demand: float) -> float:
     """Return the assistance [N m] beyond the demand, or in the wrong direction."""
     low, high = min(0.0, demand), max(0.0, demand)

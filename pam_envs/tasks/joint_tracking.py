@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed
 from pam_envs.tasks.rewards import weight
 
@@ -47,9 +45,3 @@ class PathTracking:
         """Return the largest cost of a control period for an arm of this length [m]."""
         off = self.position_weight * 2.0 * reach / self.position_scale
         return off + self.pointing_weight * 2.0 / self.pointing_scale + self.effort_weight
-
-
-@kernel
-def distance(x: float, y: float, z: float) -> float:
-    """Return the length of a vector."""
-    return math.sqrt(x * x + y * y + z * z)

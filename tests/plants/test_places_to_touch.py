@@ -56,7 +56,7 @@ from pam_envs.kernels.build import LANES, kernel
 from pam_envs.plants.core.muscle_path import begin_path, path_step
 from pam_envs.plants.core.rollout import loop_for, simulate_plants
 from pam_envs.plants.core.rows import signal_rows
-from pam_envs.plants.core.sensors import effect_kernels, read_sensors, reading_rows
+from pam_envs.plants.core.sensors import effect_kernels, read_sensors
 from pam_envs.plants.core.rollout import drives_of
 from pam_envs.pneumatics.regulator import regulator_step
 
@@ -129,7 +129,7 @@ def channels_of(plant):
 
 
 def readings_of(plant):
-    return reading_rows(K.STATE.sensors, {"pressure": K.PRESSURE_BIAS})
+    return {"pressure": K.PRESSURE_BIAS}
 
 
 def loop_of(plant, extended=False, readings=False):

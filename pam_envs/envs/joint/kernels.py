@@ -23,16 +23,15 @@ from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.pair import command
+from pam_envs.plants.antagonistic_joint.pair import advance, command
 from pam_envs.plants.antagonistic_joint.step import (
     N_WORK,
     SENSED_ANGLE,
     SENSED_PRESSURE,
-    advance,
     begin_lane,
     replacements,
-    start_hysteresis,
 )
+from pam_envs.plants.core.rollout import start_hysteresis
 from pam_envs.references import trajectory as T
 from pam_envs.references.trajectory import draw_reference
 from pam_envs.tasks.rewards import excess

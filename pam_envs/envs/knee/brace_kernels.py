@@ -16,7 +16,8 @@ from pam_envs.kernels.random import uniform
 from pam_envs.mechanics.knee_lever import muscle_length
 from pam_envs.parameters import declarations
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.step import N_WORK, SENSED, advance, begin_lane, replacements
+from pam_envs.plants.knee_orthosis.motion import N_WORK
+from pam_envs.plants.knee_orthosis.step import SENSED, advance, begin_lane, replacements
 from pam_envs.references import trajectory as T
 from pam_envs.references.trajectory import draw_reference
 from pam_envs.tasks.gait_assistance import BraceTracking

@@ -30,8 +30,8 @@ from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import SENSED, begin_lane, replacements
 from pam_envs.sensing.butterworth import butterworth
 from pam_envs.sensing.shoe import estimated_torque
-from pam_envs.tasks.gait_assistance import desired_assistance, gated_reward, over_assistance
-from pam_envs.tasks.rewards import excess
+from pam_envs.tasks.gait_assistance import desired_assistance, over_assistance
+from pam_envs.tasks.rewards import error_reward, excess
 
 VENTED = 1e3
 """Gauge pressure [Pa] up to which a growing muscle draws ambient air, at no cost."""
@@ -128,20 +128,16 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
         over = over_assistance(rows[K.TORQUE][j], demand)
         work[L.INFO.reference][j], work[L.INFO.output][j] = desired, tension
         work[L.INFO.state_torque_ideal][j] = config[L.CONFIG.ratio] * demand
-        work[L.INFO.reward_tension][j] = gated_reward(
-            tension - desired,
-            stance * seen,
-            config[L.CONFIG.tension_scale],
-            config[L.CONFIG.tension_weight],
-        )
-        work[L.INFO.reward_angle][j] = gated_reward(
-            off,
-            (1.0 - stance) * (1.0 - seen),
-            config[L.CONFIG.angle_scale],
-            config[L.CONFIG.angle_weight],
-        )
-        work[L.INFO.reward_over_assistance][j] = gated_reward(
-            over, 1.0, config[L.CONFIG.over_scale], config[L.CONFIG.over_weight]
+        work[L.INFO.reward_tension][j] = error_reward(
+            stance * seen * (tension - desired),
+            config[L.CONFIG.tension_scale], config[L.CONFIG.tension_weight],
+        )  # fmt: skip
+        work[L.INFO.reward_angle][j] = error_reward(
+            (1.0 - stance) * (1.0 - seen) * off,
+            config[L.CONFIG.angle_scale], config[L.CONFIG.angle_weight],
+        )  # fmt: skip
+        work[L.INFO.reward_over_assistance][j] = error_reward(
+            over, config[L.CONFIG.over_scale], config[L.CONFIG.over_weight]
         )
         report_brace(rows, fixed, config, work, L.INFO, L.CONFIG, j)
         work[L.INFO.cost_deviation][j] = excess(off, config[L.CONFIG.soft_deviation])

@@ -6,7 +6,7 @@ from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import FIRST_CONFIG
 from pam_envs.parameters import declarations
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.step import N_WORK
+from pam_envs.plants.knee_orthosis.motion import N_WORK
 from pam_envs.sensing.butterworth import ROWS as FILTER_ROWS
 from pam_envs.tasks.gait_assistance import GaitAssistance
 

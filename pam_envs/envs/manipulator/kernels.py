@@ -32,20 +32,18 @@ from pam_envs.mechanics.serial_chain.kernels import (
     parameter_rows,
     place_chain,
 )
-from pam_envs.plants.antagonistic_joint.pair import command
+from pam_envs.plants.antagonistic_joint.pair import advance, command
+from pam_envs.plants.core.rollout import start_hysteresis
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.step import (
     CHAIN_WORK,
     SENSED_ANGLE,
     SENSED_PRESSURE,
-    advance,
     begin_lane,
     hysteresis_rows,
     replacements,
-    start_hysteresis,
 )
 from pam_envs.references.path import along
-from pam_envs.tasks.joint_tracking import distance
 from pam_envs.tasks.rewards import error_reward, excess
 
 
@@ -170,11 +168,9 @@ def judge_pressures(rows: Any, fixed: Any, config: Any, info: Any, j: int) -> No
 @kernel
 def apart(info: Any, one: int, other: int, j: int) -> float:
     """Return the distance between two vectors, given their first rows."""
-    return distance(  # type: ignore[no-any-return]
-        info[one][j] - info[other][j],
-        info[one + 1][j] - info[other + 1][j],
-        info[one + 2][j] - info[other + 2][j],
-    )
+    x, y = info[one][j] - info[other][j], info[one + 1][j] - info[other + 1][j]
+    z = info[one + 2][j] - info[other + 2][j]
+    return math.sqrt(x * x + y * y + z * z)
 
 
 @kernel

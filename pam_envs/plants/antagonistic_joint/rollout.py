@@ -11,14 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.step import (
-    N_WORK,
-    advance,
-    begin_lane,
-    feed_forward,
-    replacements,
-    start_hysteresis,
-)
+from pam_envs.plants.antagonistic_joint.pair import advance, feed_forward
+from pam_envs.plants.antagonistic_joint.step import N_WORK, begin_lane, replacements
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.core.rollout import (
     BEGIN,
@@ -29,9 +23,9 @@ from pam_envs.plants.core.rollout import (
     loop_for,
     plants_of,
     simulate_plants,
+    start_hysteresis,
 )
 from pam_envs.plants.core.rows import signal_rows
-from pam_envs.plants.core.sensors import reading_rows
 
 if TYPE_CHECKING:
     from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -90,10 +84,10 @@ def channels_of(plant: AntagonisticJoint) -> dict[str, float]:
     return dict.fromkeys(names, 0.0) | {"prestress": plant.prestress}
 
 
-def readings_of(plant: AntagonisticJoint) -> dict[str, tuple[int, int]]:
-    """Return row and bias of each sensor's reading, by name."""
-    biases = {"pressure_a": K.PRESSURE_BIAS, "pressure_b": K.PRESSURE_BIAS}
-    return reading_rows(K.STATE.sensors, {"angle": K.ANGLE_BIAS} | biases)
+def readings_of(plant: AntagonisticJoint) -> dict[str, int]:
+    """Return the row of each sensor's bias, by name."""
+    gauges = dict.fromkeys(("pressure_a", "pressure_b"), K.PRESSURE_BIAS)
+    return {"angle": K.ANGLE_BIAS} | gauges
 
 
 def loop_of(plant: AntagonisticJoint, extended: bool = False, readings: bool = False) -> Loop:

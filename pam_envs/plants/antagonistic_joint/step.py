@@ -23,11 +23,9 @@ from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.effects import pair_kernels
 from pam_envs.plants.antagonistic_joint.pair import (
     PAIR,
-    advance,
     begin_muscles,
     command,
     contract,
-    feed_forward,
     lag_of,
     lever_of,
     peek_at,
@@ -38,17 +36,7 @@ from pam_envs.plants.antagonistic_joint.pair import (
     stop_torque,
     turning,
 )
-from pam_envs.plants.core.rollout import start_hysteresis
 from pam_envs.plants.core.sensors import read_sensors
-
-__all__ = [
-    "N_WORK",
-    "advance",
-    "begin_lane",
-    "feed_forward",
-    "replacements",
-    "start_hysteresis",
-]
 
 N_WORK = 6
 """Rows of scratch: pressures before the sub-step, rates and curvatures at its middle."""

@@ -63,26 +63,13 @@ class Equilibrium:
     names: tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 
 
-@dataclass(frozen=True)
-class LocalBranch:
-    """A hysteresis operator replaced by a line about one input: input, output and slope."""
-
-    point: float
-    output: float
-    slope: float
-
-    def __call__(self, x: ArrayLike) -> Array:
-        """Return the output on the line."""
-        return np.asarray(self.output + self.slope * (np.asarray(x, float) - self.point))
-
-
 def local_branch(
     operator: HysteresisModel | None, point: float, start: float, branch: Branch, size: float
-) -> LocalBranch:
-    """Return the line of an operator about ``point``, reached in one direction from ``start``.
+) -> Callable[[ArrayLike], Array]:
+    """Return a line in place of an operator about ``point``, reached one way from ``start``.
 
-    It is the mean slope over ``size`` (in the unit of the input) in that direction (``"loading"``)
-    or back (``"turned"``).
+    Its slope is the mean one over ``size`` (in the unit of the input) in that direction
+    (``"loading"``) or back (``"turned"``).
     """
     if branch not in ("loading", "turned"):
         raise ValueError(f"branch = {branch!r}; choose 'loading' or 'turned'")
@@ -91,18 +78,8 @@ def local_branch(
     step = size * (outward if branch == "loading" else -outward)
     output, state = model.simulate(np.array([start, point]))
     beyond = float(np.asarray(model.step(point + step, state)[0]))
-    return LocalBranch(point, float(output[-1]), (beyond - float(output[-1])) / step)
-
-
-def equilibrium(plant: Plant, **point: Any) -> Equilibrium:
-    """Return the smooth equations of a plant about an operating point of its family."""
-    if plant.extended:
-        raise ValueError(
-            "effects are on, and the linear model is that of the plain equations: linearise "
-            "plant.replace(plant.neutral)"
-        )
-    made: Equilibrium = plant.module("at_rest").at_rest(plant, **point)
-    return made
+    held, slope = float(output[-1]), (beyond - float(output[-1])) / step
+    return lambda x: np.asarray(held + slope * (np.asarray(x, float) - point))
 
 
 def linearise(plant: Plant, **point: Any) -> Any:
@@ -131,7 +108,12 @@ def linearise(plant: Plant, **point: Any) -> Any:
         import control
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(MISSING) from error
-    found = equilibrium(plant, **point)
+    if plant.extended:
+        raise ValueError(
+            "effects are on, and the linear model is that of the plain equations: linearise "
+            "plant.replace(plant.neutral)"
+        )
+    found: Equilibrium = plant.module("at_rest").at_rest(plant, **point)
     n = len(found.state)
     both = np.concatenate([found.state, found.command])
     rates, outputs = [], []

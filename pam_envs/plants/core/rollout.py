@@ -196,7 +196,7 @@ class Loop:
 def loop_for(
     name: str, plant: Any, layout: Any, kernels: Mapping[str, Any],
     replacements: Callable[[int | None], Mapping[str, Any]], outputs: Iterable[int], work: int, *,
-    extended: bool, readings: Mapping[str, tuple[int, int]] | None = None, operators: int = 1,
+    extended: bool, readings: Mapping[str, int] | None = None, operators: int = 1,
     parameters: int | None = None, extra: Array | None = None,
 ) -> Loop:  # fmt: skip
     """Return the loop of a variant of plants, plain or extended.
@@ -211,16 +211,15 @@ def loop_for(
     outputs : iterable of int
         Rows of a rollout's signals.
     readings : mapping, optional
-        Sensors whose readings are the outputs instead: row, counted from the first of the effects'
-        state, and row of the bias.
+        Row of the bias of each sensor, by name: the outputs are their readings instead.
     operators, parameters : int
         Number of its hysteresis operators; rows of parameters, by default ``layout.N_PARAMETERS``.
     """
     effects = layout.END + operators * state_rows(plant.hysteresis.kind)
     made = {"END": layout.END, **kernels, **replacements(effects if extended else None)}
     if readings is not None:
-        made |= {"BIAS_ROWS": tuple(b for _, b in readings.values()), "plant_output": biased_output}
-        outputs = [effects + row for row, _ in readings.values()]
+        made |= {"BIAS_ROWS": tuple(readings.values()), "plant_output": biased_output}
+        outputs = [effects + layout.STATE.sensors + k for k in range(len(readings))]
     what = ("_extended" if extended else "") + ("_readings" if readings is not None else "")
     return Loop(
         name + what,

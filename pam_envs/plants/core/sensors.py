@@ -6,7 +6,7 @@ control period; :func:`effect_kernels` gives its replacement.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from pam_envs.kernels.build import kernel
@@ -83,8 +83,3 @@ def effect_kernels(
         stuck = first + layout.STATE.stuck
         found |= {"STUCK": stuck, "BEARING": layout.EFFECT.bearing, "turn": turn_on_bearing}
     return found
-
-
-def reading_rows(first: int, biases: Mapping[str, int]) -> dict[str, tuple[int, int]]:
-    """Return the row of each sensor's reading, from ``first`` on, and the row of its bias."""
-    return {name: (first + k, bias) for k, (name, bias) in enumerate(biases.items())}

@@ -78,18 +78,11 @@ class ElbowOrthosis(Plant, rows=K):
         return Usage("an elbow", "virgin", reach=0.55 * self.pulley.stroke)
 
     def _check(self) -> None:
-        self._check_bundles()
-        self._check_range()
-        self._check_motion()
-
-    def _check_bundles(self) -> None:
+        """Refuse parts of muscles, a stroke beyond the bundles' force, and too fast a motion."""
         for name in ("bundle_a", "bundle_b"):
             muscles = getattr(self, name).muscles
             if muscles != int(muscles):
                 raise ValueError(f"{name}.muscles = {muscles:g} must be a whole number, 1 or more")
-
-    def _check_range(self) -> None:
-        """Refuse a stroke beyond the range of the bundles' force or of the hysteresis map."""
         if self.pulley.lowest >= self.pulley.highest:
             raise ValueError(
                 f"pulley.lowest = {self.pulley.lowest:g} rad is not below pulley.highest = "
@@ -102,9 +95,6 @@ class ElbowOrthosis(Plant, rows=K):
                 f"m contracts the bundles beyond {shortest:.4f} m, where their force ends; use a "
                 "smaller radius or longer muscles"
             )
-
-    def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow."""
         inertia = self.link.inertia + self.wearer.inertia
         damping = self.link.damping + self.wearer.damping
         ends = np.array(self.angle_range)

@@ -19,16 +19,10 @@ from pam_envs.plants.core.rollout import (
     simulate_plants,
 )
 from pam_envs.plants.core.rows import signal_rows
-from pam_envs.plants.core.sensors import reading_rows
 from pam_envs.plants.elbow_orthosis import rows as K
+from pam_envs.plants.elbow_orthosis.air import N_WORK
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-from pam_envs.plants.elbow_orthosis.step import (
-    N_WORK,
-    advance,
-    begin_lane,
-    replacements,
-    start_hysteresis,
-)
+from pam_envs.plants.elbow_orthosis.step import advance, begin_lane, replacements, start_hysteresis
 
 OUTPUTS = signal_rows(
     K,
@@ -75,10 +69,10 @@ def channels_of(plant: ElbowOrthosis) -> dict[str, float]:
     return dict.fromkeys(names, 0.0) | {"intent": 1.0}
 
 
-def readings_of(plant: ElbowOrthosis) -> dict[str, tuple[int, int]]:
-    """Return row and bias of each sensor's reading, by name."""
-    biases = {"pressure_a": K.PRESSURE_BIAS, "pressure_b": K.PRESSURE_BIAS}
-    return reading_rows(K.STATE.sensors, {"angle": K.ANGLE_BIAS} | biases)
+def readings_of(plant: ElbowOrthosis) -> dict[str, int]:
+    """Return the row of each sensor's bias, by name."""
+    gauges = dict.fromkeys(("pressure_a", "pressure_b"), K.PRESSURE_BIAS)
+    return {"angle": K.ANGLE_BIAS} | gauges
 
 
 def loop_of(plant: ElbowOrthosis, extended: bool = False, readings: bool = False) -> Loop:

@@ -24,7 +24,6 @@ from pam_envs.plants.elbow_orthosis.air import (
     DRIVE_WAS,
     GIVES_A,
     MIDDLE,
-    N_WORK,
     NOW_A,
     WAS_A,
     air_at,
@@ -38,15 +37,6 @@ from pam_envs.plants.elbow_orthosis.bundles import (
     weight_of,
 )
 from pam_envs.plants.elbow_orthosis.effects import bundle_kernels
-
-__all__ = [
-    "N_WORK",
-    "advance",
-    "begin_lane",
-    "replacements",
-    "start_hysteresis",
-    "weight_of",
-]
 
 SOFTEST = 0.1
 """Least stiffness [N m/rad] that a sub-step reckons with."""

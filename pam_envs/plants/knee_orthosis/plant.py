@@ -125,11 +125,7 @@ class KneeOrthosis(Plant, rows=K):
         return Usage("the orthosis", "low", self.regulator.max_pressure, unit_slope=False)
 
     def _check(self) -> None:
-        self._check_motion()
-        self._check_toggle()
-
-    def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow."""
+        """Refuse too fast a motion, and a strap with which the wire opens past its toggle."""
         lever, leg, hold = self.lever, self.leg, 0.0
         inertia, damping = lever.inertia, lever.damping
         if self.mounting == "leg":
@@ -143,9 +139,6 @@ class KneeOrthosis(Plant, rows=K):
             f"lever.inertia = {lever.inertia:g} kg m2 with lever.damping = {lever.damping:g} "
             f"N m s/rad and lever.stiffness = {lever.stiffness:g} N m/rad",
         )
-
-    def _check_toggle(self) -> None:
-        """Refuse a strap setting with which the knee's flexion opens the wire past its toggle."""
         if self.mounting != "leg":
             return
         widest = self.lever.mount_angle + float(self.gait_table()[:, 0].max())
@@ -210,10 +203,8 @@ class KneeOrthosis(Plant, rows=K):
 
     @classmethod
     def _preset(cls, hysteresis: str, changes: Mapping[str, float], **makes: Any) -> KneeOrthosis:
-        activity = makes.pop("activity", "walk")
-        plant = cls(hysteresis=knee_hysteresis(hysteresis), dynamics=makes["dynamics"])
-        plant = plant.changed(changes)
-        return dataclasses.replace(plant, mounting=makes["mounting"], activity=activity)
+        plant = cls(hysteresis=knee_hysteresis(hysteresis)).changed(changes)
+        return dataclasses.replace(plant, **makes)
 
     # --- statics ----------------------------------------------------------------------------------
 

@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import COMPILED, LANES, kernel
-from pam_envs.plants.core.rollout import Loop, drives_of, loop_for, simulate_plants
-from pam_envs.plants.core.rows import signal_rows
-from pam_envs.plants.core.sensors import reading_rows
-from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
-from pam_envs.plants.knee_orthosis.step import (
-    N_WORK,
-    advance,
-    begin_lane,
-    replacements,
+from pam_envs.plants.core.rollout import (
+    Loop,
+    drives_of,
+    loop_for,
+    simulate_plants,
     start_hysteresis,
 )
+from pam_envs.plants.core.rows import signal_rows
+from pam_envs.plants.knee_orthosis import rows as K
+from pam_envs.plants.knee_orthosis.motion import N_WORK
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from pam_envs.plants.knee_orthosis.step import advance, begin_lane, replacements
 
 OUTPUTS = signal_rows(
     K,
@@ -67,10 +67,9 @@ def channels_of(plant: KneeOrthosis) -> dict[str, float]:
     return {"set_point": 0.0, "phase": 0.0, "pressure": 0.0}
 
 
-def readings_of(plant: KneeOrthosis) -> dict[str, tuple[int, int]]:
-    """Return row and bias of each sensor's reading, by name."""
-    biases = {name: getattr(K, f"{name}_BIAS".upper()) for name in K.SENSORS}
-    return reading_rows(K.STATE.sensors, biases)
+def readings_of(plant: KneeOrthosis) -> dict[str, int]:
+    """Return the row of each sensor's bias, by name."""
+    return {name: K.place(f"{name}.bias") for name in K.SENSORS}
 
 
 def loop_of(plant: KneeOrthosis, extended: bool = False, readings: bool = False) -> Loop:

@@ -14,14 +14,11 @@ from pam_envs.hysteresis import protocol
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.plants.core.muscle_path import regulated
-from pam_envs.plants.core.rollout import start_hysteresis
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.effects import muscle_kernels
-from pam_envs.plants.knee_orthosis.motion import MOTIONS, N_WORK, WAS
+from pam_envs.plants.knee_orthosis.motion import MOTIONS, WAS
 from pam_envs.pneumatics.measured_dynamics import MODES, REAL_MODES, pair_factor, turned
-
-__all__ = ["N_WORK", "advance", "begin_lane", "replacements", "start_hysteresis"]
 
 PAIR = K.MODE_TABLE + 2 * REAL_MODES
 """First row of the parameters of the slow pair: decay, frequency, two gains."""

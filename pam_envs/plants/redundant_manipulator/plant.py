@@ -167,13 +167,8 @@ class RedundantManipulator(PairPlant, rows=M):
         provenance: Mapping[str, tuple[str, str]], changes: Mapping[str, float],
     ) -> RedundantManipulator:  # fmt: skip
         plant = cls(
+            **{name: getattr(chain, name) for name in (*LINKS, "gravity")},
             axes="".join(chain.axes),
-            lengths=chain.lengths,
-            masses=chain.masses,
-            centres=chain.centres,
-            across=chain.across,
-            along=chain.along,
-            gravity=chain.gravity,
             joint_damping=(0.0,) * chain.stages,
             hysteresis=joint_hysteresis(hysteresis),
             muscle=muscle,

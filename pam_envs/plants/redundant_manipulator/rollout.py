@@ -10,19 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.mechanics.serial_chain.kernels import N_STAGES, parameter_rows
-from pam_envs.plants.antagonistic_joint.pair import command
-from pam_envs.plants.core.rollout import Loop, drives_of, loop_for, run
+from pam_envs.plants.antagonistic_joint.pair import advance, command
+from pam_envs.plants.core.rollout import Loop, drives_of, loop_for, run, start_hysteresis
 from pam_envs.plants.core.rows import signal_rows
-from pam_envs.plants.core.sensors import reading_rows
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
-from pam_envs.plants.redundant_manipulator.step import (
-    advance,
-    begin_lane,
-    replacements,
-    start_hysteresis,
-    work_rows,
-)
+from pam_envs.plants.redundant_manipulator.step import begin_lane, replacements, work_rows
 
 JOINT_OUTPUTS = signal_rows(M, "angle velocity torque stiffness")
 MUSCLE_OUTPUTS = signal_rows(M, "pressure set_point force contraction lag")
@@ -61,11 +54,11 @@ def channels_of(plant: RedundantManipulator) -> dict[str, float]:
     return {"payload": 0.0, "prestress": plant.prestress} | dict.fromkeys(commands, 0.0)
 
 
-def readings_of(plant: RedundantManipulator) -> dict[str, tuple[int, int]]:
-    """Return row and bias of each sensor's reading, by name."""
+def readings_of(plant: RedundantManipulator) -> dict[str, int]:
+    """Return the row of each sensor's bias, by name."""
     angles = {f"angle_{k}": M.ANGLE_BIAS for k in range(plant.stages)}
     pressures = {f"pressure_{m}": M.PRESSURE_BIAS for m in range(2 * plant.stages)}
-    return reading_rows(M.STATE.sensors, angles | pressures)
+    return angles | pressures
 
 
 def loop_of(plant: RedundantManipulator, extended: bool = False, readings: bool = False) -> Loop:

@@ -35,11 +35,9 @@ from pam_envs.mechanics.serial_chain.kernels import work_rows as chain_work_rows
 from pam_envs.plants.antagonistic_joint.effects import pair_kernels
 from pam_envs.plants.antagonistic_joint.pair import (
     PAIR,
-    advance,
     begin_muscles,
     command,
     contract,
-    feed_forward,
     friction_of,
     lag_of,
     lever_of,
@@ -51,20 +49,8 @@ from pam_envs.plants.antagonistic_joint.pair import (
     stop_torque,
     turning,
 )
-from pam_envs.plants.core.rollout import start_hysteresis
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.redundant_manipulator import rows as M
-
-__all__ = [
-    "CHAIN_WORK",
-    "advance",
-    "begin_lane",
-    "feed_forward",
-    "hysteresis_rows",
-    "replacements",
-    "start_hysteresis",
-    "work_rows",
-]
 
 CHAIN_WORK = 6 * M.MOST_STAGES
 """First row of the chain's scratch, after pressures before the sub-step and geometry at its middle

@@ -14,8 +14,7 @@ from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.kernels.motion import oscillator_wide
-from pam_envs.plants.core.rollout import Loop, drives_of, loop_for, run
-from pam_envs.plants.core.sensors import reading_rows
+from pam_envs.plants.core.rollout import Loop, drives_of, first_of, loop_for, plants_of, run
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import (
     EFFECTS_AT,
@@ -112,10 +111,9 @@ def channels_of(plant: SingleMuscle) -> dict[str, float]:
     return dict.fromkeys(names, 0.0) | usual
 
 
-def readings_of(plant: SingleMuscle) -> dict[str, tuple[int, int]]:
-    """Return row and bias of each sensor's reading, by name."""
-    biases = {"contraction": R.POSITION_BIAS, "pressure": R.PRESSURE_BIAS}
-    return reading_rows(R.STATE.sensors, biases)
+def readings_of(plant: SingleMuscle) -> dict[str, int]:
+    """Return the row of each sensor's bias, by name."""
+    return {"contraction": R.POSITION_BIAS, "pressure": R.PRESSURE_BIAS}
 
 
 def _replacements(kind: str, effects: int | None) -> dict[str, Any]:
@@ -198,14 +196,8 @@ def simulate(
         ``contraction``, ``velocity``, ``pressure`` and ``drive``, shape (T,) for one plant and
         (T, n) for several; see :func:`simulate_rows`.
     """
-    several = [plants] if isinstance(plants, SingleMuscle) else list(plants)
-    first = several[0]
-    if any(
-        p.hysteresis.kind != first.hysteresis.kind or p.substeps != first.substeps for p in several
-    ):
-        raise ValueError(
-            "plants that are simulated together need the same hysteresis and sub-steps"
-        )
+    several = plants_of(plants)
+    first = first_of(several, "hysteresis.kind", "substeps")
     outputs = simulate_rows(first, np.array([p.parameter_rows() for p in several]), set_points)
     if isinstance(plants, SingleMuscle):
         outputs = outputs[:, :, 0]
