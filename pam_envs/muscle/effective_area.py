@@ -11,7 +11,6 @@ with a Gaussian taper, fit published isometric maps of 10 mm muscles.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -89,14 +88,6 @@ class EffectiveAreaMuscle(
         """Return the effective pressure [Pa] that gives ``force`` [N] at ``strain`` [1]."""
         e = np.asarray(strain, float)
         return (np.asarray(force, float) + self.passive(e)) / self.area_at(e)
-
-    def volume(self, strain: ArrayLike) -> NDArray[np.float64]:
-        """Return the inner volume [m3] of an ideal braid of inextensible threads."""
-        ratio = (1.0 - np.asarray(strain, float)) * math.cos(self.braid_angle)
-        tall = math.pi * self.diameter**2 / 4.0 / math.sin(self.braid_angle) ** 2
-        return np.asarray(
-            tall * self.rest_length * (1.0 - np.asarray(strain)) * (1.0 - ratio * ratio)
-        )
 
 
 @kernel

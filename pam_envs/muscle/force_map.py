@@ -19,7 +19,6 @@ Actuators 6 (2017) 33: the map.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,13 +105,6 @@ class ForceMap(TemperatureEffects):
     def pressure(self, force: ArrayLike, contraction: ArrayLike) -> NDArray[np.float64]:
         """Return the pressure [Pa] of a force [N] at a contraction [1]: exact."""
         return (np.asarray(force, float) + self.passive(contraction)) / self.area_at(contraction)
-
-    def volume(self, contraction: ArrayLike) -> NDArray[np.float64]:
-        """Return the inner volume [m3], by virtual work from the force that pressure exerts."""
-        x = np.asarray(contraction, float)
-        bore = 0.25 * math.pi * self.diameter**2
-        grown = self.area * x * (1.0 - 0.5 * self.taper * x / self.stretch)
-        return np.asarray(self.rest_length * (bore + grown))
 
     def longest_contraction(self, pressure: float = FULL_PRESSURE) -> float:
         """Return the contraction [1] at which no force is left at a pressure [Pa]."""

@@ -51,11 +51,6 @@ class GasSpring(TemperatureEffects):
         stretch = np.maximum(1e-4, np.asarray(length) - self.shortest_length)
         return np.asarray(tension) / stretch
 
-    def volume(self, length: ArrayLike) -> NDArray[np.float64]:
-        """Return the inner volume [m3] at a length [m]."""
-        stretch = np.asarray(length) - self.shortest_length
-        return np.asarray(self.full_volume - 0.5 * self.stiffness_ratio * stretch**2)
-
 
 @kernel
 def stretch_of(length: float, shortest: float) -> float:

@@ -13,25 +13,8 @@ def weight(default: float, meaning: str) -> float:
 
 @kernel
 def error_reward(error: float, scale: float, weight: float) -> float:
-    """Return the reward for an error: linear, at most 0."""
+    """Return the reward for an error, or for a change over its range: linear, at most 0."""
     return -weight * abs(error) / scale
-
-
-@kernel
-def effort_reward(change: float, full: float, weight: float) -> float:
-    """Return the reward for a change of setpoint relative to its range: at most 0."""
-    return -weight * abs(change) / full
-
-
-@kernel
-def ended_reward(ended: float, time: float, seconds: float, period: float, worst: float) -> float:
-    """Return the reward for the end of an episode at a limit; 0 if ``ended`` is 0.
-
-    This period and all that remain of ``seconds`` count ``-worst``, the lowest possible reward, so
-    that a policy never gains by ending an episode, at any discount factor up to 1.
-    """
-    left = max(0.0, seconds - time) / period + 1.0
-    return -worst * left if ended > 0.0 else 0.0
 
 
 @kernel

@@ -37,7 +37,7 @@ from pam_envs.muscle.force_map import ForceMap
 from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis
 from pam_envs.plants.core.plant import Plant
 from pam_envs.pneumatics.regulator import JointRegulator
-from pam_envs.sensing.orthosis import GaugeSensor
+from pam_envs.sensing.sensor import GaugeSensor
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, KEY_A, KEY_B, PERIOD
+from pam_envs.kernels.arithmetic import quantise
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.kernels.random import normal, uniform
 from pam_envs.references.trajectory import SAMPLES, reference_value
-from pam_envs.sensing.sensor import read_sensor
-from pam_envs.tasks.rewards import effort_reward, ended_reward, error_reward, excess
+from pam_envs.tasks.rewards import error_reward, excess
 
 FIRST_HYSTERESIS = FIRST_REFERENCE = 0  # placeholders: first rows of hysteresis and reference
 plant_advance: Any = None
@@ -55,13 +55,8 @@ def sense(
 
     ``sensor`` is the first row of its noise, resolution and bias, ``stream`` its random stream.
     """
-    return read_sensor(
-        true,
-        fixed[sensor][j],
-        fixed[sensor + 1][j],
-        fixed[sensor + 2][j],
-        normal(counts[KEY_A][j], counts[KEY_B][j], stream, draw),
-    )
+    drawn = normal(counts[KEY_A][j], counts[KEY_B][j], stream, draw)
+    return quantise(true + fixed[sensor + 2][j] + fixed[sensor][j] * drawn, fixed[sensor + 1][j])
 
 
 @kernel
@@ -116,14 +111,16 @@ def report_pressure(
     """Write cost and margin of the highest pressure, and the reward for a change of setpoints."""
     work[info.cost_pressure][j] = excess(pressure, config[at.soft_pressure])
     work[info.margin_pressure][j] = config[at.soft_pressure] - pressure
-    work[info.reward_effort][j] = effort_reward(change, full, config[at.effort_weight])
+    work[info.reward_effort][j] = error_reward(change, full, config[at.effort_weight])
 
 
 @kernel
 def report_end(work: Any, config: Any, info: Any, at: Any, flag: int, broken: bool, j: int) -> None:
-    """Write the flag of a broken limit, and the reward for the remaining periods if it is set."""
-    ended, worst = 1.0 if broken else 0.0, config[at.worst_period]
-    work[flag][j] = ended
-    work[info.reward_ended][j] = ended_reward(
-        ended, work[info.time][j], config[EPISODE_SECONDS], config[PERIOD], worst
-    )
+    """Write the flag of a broken limit, and the reward for the end of the episode there.
+
+    This period and all that remain count ``-worst_period``, the lowest possible reward, so that a
+    policy never gains by ending an episode, at any discount factor up to 1.
+    """
+    left = max(0.0, config[EPISODE_SECONDS] - work[info.time][j]) / config[PERIOD] + 1.0
+    work[flag][j] = 1.0 if broken else 0.0
+    work[info.reward_ended][j] = -config[at.worst_period] * left if broken else 0.0

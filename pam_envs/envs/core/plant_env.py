@@ -9,9 +9,18 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.configured import Configured, fresh_seed, space_of
 from pam_envs.envs.core.info import Info
-from pam_envs.envs.core.setup import BEGIN, STEP, Setup, check_seed, check_state, saved
+from pam_envs.envs.core.setup import (
+    BEGIN,
+    STEP,
+    Configured,
+    Setup,
+    check_seed,
+    check_state,
+    fresh_seed,
+    saved,
+    space_of,
+)
 from pam_envs.kernels.build import COMPILED, address_book
 from pam_envs.kernels.random import seed_words
 

@@ -10,17 +10,19 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.configured import Configured, fresh_seed, space_of
 from pam_envs.envs.core.setup import (
     BEGIN,
     STEP_AND_RESTART,
+    Configured,
     Setup,
     check_choice,
     check_seed,
     check_state,
     check_whole,
     for_kernels,
+    fresh_seed,
     saved,
+    space_of,
     tiles_for,
 )
 from pam_envs.kernels.build import COMPILED, LANES

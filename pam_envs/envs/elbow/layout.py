@@ -6,7 +6,7 @@ from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import FIRST_CHOICE, FIRST_CONFIG
 from pam_envs.parameters import declarations
 from pam_envs.plants.elbow_orthosis import rows as K
-from pam_envs.plants.elbow_orthosis.air import N_WORK
+from pam_envs.plants.elbow_orthosis.bundles import N_WORK
 from pam_envs.references.reaches import ROWS as MOTION_ROWS
 from pam_envs.tasks.torque_stiffness import OBJECTS, TorqueStiffness
 

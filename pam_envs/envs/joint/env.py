@@ -47,7 +47,7 @@ from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, co
 from pam_envs.envs.joint import kernels as L
 from pam_envs.plants.antagonistic_joint import rows as R
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
-from pam_envs.plants.antagonistic_joint.statics import check_borne
+from pam_envs.plants.antagonistic_joint.statics import PRESTRESS_RANGE, check_borne
 from pam_envs.references.trajectory import FAMILIES, SAMPLES, sines_needed
 from pam_envs.tasks.joint_tracking import JointTracking
 
@@ -83,7 +83,7 @@ def _signals(plant: AntagonisticJoint, action: str) -> tuple[list[Part], list[Pa
     if action == "pressures":
         return observation, [(f"pressure_{muscle}_set_point", *pressures) for muscle in "ab"]
     angles = ("rad", *plant.angle_range)
-    prestress: list[Part] = [("prestress", "N", *plant.prestress_range)]
+    prestress: list[Part] = [("prestress", "N", *PRESTRESS_RANGE)]
     stiff = prestress if action == "angle_stiffness" else []
     return [*observation, ("set_point", *angles), *stiff], [("angle_set_point", *angles), *stiff]
 

@@ -24,11 +24,11 @@ from pam_envs.muscle.effective_area import volume
 from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import replacements
-from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.step import (
     N_WORK,
     advance,
     begin_effects,
+    hysteresis_kernels,
     rest_contraction,
     seen_position,
     seen_pressure,

@@ -29,8 +29,7 @@ from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis, joint
 from pam_envs.plants.antagonistic_joint.link import Link, NominalPoint
 from pam_envs.plants.antagonistic_joint.statics import PairPlant
 from pam_envs.pneumatics.regulator import JointRegulator
-from pam_envs.sensing.orthosis import GaugeSensor
-from pam_envs.sensing.sensor import JointEncoder
+from pam_envs.sensing.sensor import GaugeSensor, JointEncoder
 
 Dynamics = Literal["muscles", "reduced"]
 Array = NDArray[np.float64]
@@ -156,12 +155,8 @@ class AntagonisticJoint(PairPlant, rows=K):
         return low, high
 
     def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
-        """Return the addition to setpoints [rad] that compensates gravity, shape (..., 1).
-
-        ``angles`` (..., 1) [rad] are those at which link and payload [kg] are to rest.
-        """
-        phi = np.asarray(angles, float)
-        return self._shift(phi, self.weight_torque(phi, np.asarray(payload)[..., None]))
+        """Return the addition to setpoints [rad] that compensates gravity, shape (..., 1)."""
+        return super().gravity_shift(angles, np.asarray(payload)[..., None])
 
     # --- rows, files, identity --------------------------------------------------------------------
 
@@ -170,6 +165,8 @@ class AntagonisticJoint(PairPlant, rows=K):
 
         Quasi-static, hysteresis included, from the straight virgin state, without gravity and load.
         """
-        from pam_envs.plants.antagonistic_joint.rollout import rest_angles
+        from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
 
-        return rest_angles(self, commands, prestress)
+        series = np.concatenate([[0.0], np.asarray(commands, float)])
+        floating = self.replace({"link.gravity": 0.0})
+        return simulate_joint(floating, series, prestress=prestress, quasi_static=True)["angle"][1:]

@@ -153,16 +153,3 @@ def simulate_joint(
     return simulate_plants(
         loop_of, plants, MAKE, drives, OUTPUTS, single=single, flags=flags, compiled=compiled
     )
-
-
-def rest_angles(
-    plant: AntagonisticJoint, commands: ArrayLike, prestress: float | None = None
-) -> Array:
-    """Return the angle at rest [rad] after each of a series of setpoints [rad], shape (T,).
-
-    From the straight virgin state, without gravity and load.
-    """
-    series = np.concatenate([[0.0], np.asarray(commands, float)])
-    floating = plant.replace({"link.gravity": 0.0})
-    made = simulate_joint(floating, series, prestress=prestress, quasi_static=True)
-    return made["angle"][1:]

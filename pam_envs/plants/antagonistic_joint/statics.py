@@ -66,11 +66,6 @@ class PairPlant(Plant):
         """Usual co-contraction [N]."""
         return self.nominal.prestress
 
-    @property
-    def prestress_range(self) -> tuple[float, float]:
-        """Lowest and highest co-contraction [N] that is a setpoint."""
-        return PRESTRESS_RANGE
-
     # --- statics --------------------------------------------------------------------------------
 
     def forces_for(
@@ -155,9 +150,14 @@ class PairPlant(Plant):
             low, high = np.where(less, middle, low), np.where(less, high, middle)
         return np.asarray(0.5 * (low + high) - phi)
 
-    def _shift(self, angles: Array, weight: Array) -> Array:
-        held = np.clip(angles, *self.angle_range)
-        return self.shift_for(held, self.prestress, weight, self.link.limit)
+    def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
+        """Return the addition to setpoints [rad] that compensates gravity, shape (..., n).
+
+        ``angles`` (..., n) [rad] are those at rest, with a payload (...) [kg].
+        """
+        phi, limit = np.asarray(angles, float), self.link.limit
+        held = np.clip(phi, -limit, limit)
+        return self.shift_for(held, self.prestress, self.weight_torque(phi, payload), limit)
 
     def _reach(self, prestress: float | None, load: Callable[[float], float]) -> float:
         """Return the largest angle [rad] up to the stop at which the co-contraction [N] is held.

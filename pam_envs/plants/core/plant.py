@@ -245,15 +245,11 @@ class Plant:
 
     def hysteresis_tables(self) -> NDArray[np.float64]:
         """Return the tables of the hysteresis of all members, shape (members, ., .)."""
-        return tables_of([member._component.operator for member in self.members()])
-
-    @property
-    def _component(self) -> OperatorComponent:
-        return self.hysteresis  # type: ignore[attr-defined, no-any-return]
+        return tables_of([member.hysteresis.operator for member in self.members()])  # type: ignore[attr-defined]
 
     @property
     def _model(self) -> HysteresisModel:
-        return self._component.model
+        return self.hysteresis.model  # type: ignore[attr-defined, no-any-return]
 
     @classmethod
     def module(cls, name: str) -> Any:

@@ -12,7 +12,7 @@ from pam_envs.kernels.build import LANES, kernel
 from pam_envs.plants.core.muscle_path import PATH_STATE, WARM, begin_path, path_air, path_muscle
 from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.plants.elbow_orthosis import rows as K
-from pam_envs.plants.elbow_orthosis.air import AIR, GIVES_A, NOW_A, WAS_A, count_used_air
+from pam_envs.plants.elbow_orthosis.bundles import AIR, GIVES_A, NOW_A, WAS_A, count_used_air
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 FULL_SCALES = (2.1, 6e5, 6e5)

@@ -33,7 +33,7 @@ from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.hysteresis import ElbowHysteresis, elbow_hysteresis
 from pam_envs.pneumatics.on_off_pair import OnOffValve
 from pam_envs.pneumatics.regulator import BundleRegulator
-from pam_envs.sensing.orthosis import AngleSensor, GaugeSensor
+from pam_envs.sensing.sensor import AngleSensor, GaugeSensor
 
 Valves = Literal["proportional", "on_off"]
 Array = NDArray[np.float64]
@@ -158,11 +158,6 @@ class ElbowOrthosis(Plant, rows=K):
     def cycle(self) -> float:
         """Cycle of the on/off valves [s]."""
         return 1.0 / self.valve.frequency
-
-    @property
-    def cycle_periods(self) -> int:
-        """Control periods in a cycle of the on/off valves."""
-        return max(1, round(self.cycle / self.control_period))
 
     # --- statics, without hysteresis ------------------------------------------------------------
 

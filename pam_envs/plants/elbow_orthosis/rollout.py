@@ -20,7 +20,7 @@ from pam_envs.plants.core.rollout import (
 )
 from pam_envs.plants.core.rows import signal_rows
 from pam_envs.plants.elbow_orthosis import rows as K
-from pam_envs.plants.elbow_orthosis.air import N_WORK
+from pam_envs.plants.elbow_orthosis.bundles import N_WORK
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.plants.elbow_orthosis.step import advance, begin_lane, replacements, start_hysteresis
 

@@ -19,7 +19,7 @@ from pam_envs.mechanics.guide import turn
 from pam_envs.mechanics.pulley import stop_torque
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.elbow_orthosis import rows as K
-from pam_envs.plants.elbow_orthosis.air import (
+from pam_envs.plants.elbow_orthosis.bundles import (
     AIR,
     DRIVE_WAS,
     GIVES_A,
@@ -27,8 +27,6 @@ from pam_envs.plants.elbow_orthosis.air import (
     NOW_A,
     WAS_A,
     air_at,
-)
-from pam_envs.plants.elbow_orthosis.bundles import (
     contraction_at,
     factors_of,
     friction_of,

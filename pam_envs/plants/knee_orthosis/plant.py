@@ -35,7 +35,7 @@ from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.hysteresis import KneeHysteresis, knee_hysteresis
 from pam_envs.pneumatics.measured_dynamics import OrthosisRegulator, mode_rows
 from pam_envs.references.gait import ACTIVITIES, PAPER_STRIDE, SIGNALS, gait_table
-from pam_envs.sensing.orthosis import (
+from pam_envs.sensing.sensor import (
     AngleSensor,
     CopSensor,
     GaugeSensor,

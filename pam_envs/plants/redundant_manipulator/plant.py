@@ -49,8 +49,7 @@ from pam_envs.plants.antagonistic_joint.plant import (
 from pam_envs.plants.antagonistic_joint.statics import PairPlant
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.pneumatics.regulator import JointRegulator
-from pam_envs.sensing.orthosis import GaugeSensor
-from pam_envs.sensing.sensor import JointEncoder
+from pam_envs.sensing.sensor import GaugeSensor, JointEncoder
 
 Array = NDArray[np.float64]
 
@@ -183,7 +182,7 @@ class RedundantManipulator(PairPlant, rows=M):
         viscous = self.muscle.viscosity * float(np.sum(np.array(pressures) * rate**2))
         own = viscous / self.muscle.rest_length + self.link.damping
         inertia = np.diag(self.chain.mass_matrix(np.zeros(self.stages), 0.0))
-        stiffness = float(self.stiffness_at(0.0)) + np.maximum(0.0, self.weight_stiffness())
+        stiffness = float(self.stiffness_at(0.0)) + np.maximum(0.0, self._weights_alone(0.0)[1])
         total = 2.0 * DAMPING_RATIO * np.sqrt(stiffness * inertia)
         return tuple(float(round(d, 3)) for d in np.maximum(0.0, total - own))
 
@@ -208,10 +207,6 @@ class RedundantManipulator(PairPlant, rows=M):
 
     # --- statics --------------------------------------------------------------------------------
 
-    def weight_stiffness(self, payload: float = 0.0) -> Array:
-        """Return each joint's slope of weight torque by its own angle [N m/rad], arm straight."""
-        return self._weights_alone(payload)[1]
-
     def reachable_angle(self, prestress: float | None = None, payload: float = 0.0) -> float:
         """Return the largest angle [rad] that each joint of a straight arm reaches alone.
 
@@ -233,14 +228,6 @@ class RedundantManipulator(PairPlant, rows=M):
         bent = 0.5 * math.pi * np.eye(self.stages)
         across = [self.chain.gravity_torque(q, payload)[k] for k, q in enumerate(bent)]
         return straight, np.array(across)
-
-    def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
-        """Return the addition to setpoints [rad] that compensates gravity, shape (..., n).
-
-        ``angles`` (..., n) [rad] are those at rest, ``payload`` (...) [kg] is at the tip.
-        """
-        phi = np.asarray(angles, float)
-        return self._shift(phi, self.weight_torque(phi, payload))
 
     def weight_torque(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
         """Return the torques [N m] that hold arm and payload [kg] at angles (..., n) [rad]."""

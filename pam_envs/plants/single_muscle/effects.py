@@ -39,8 +39,8 @@ from pam_envs.muscle.effects import (
 )
 from pam_envs.plants.core.sensors import effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.rows import STATE as S
+from pam_envs.plants.single_muscle.step import hysteresis_kernels
 from pam_envs.pneumatics.regulator import (
     air_step,
     begin_air,

@@ -23,9 +23,14 @@ from pam_envs.plants.single_muscle.effects import (
     rest_extended,
     settled,
 )
-from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-from pam_envs.plants.single_muscle.step import N_WORK, advance, rest_contraction, true_position
+from pam_envs.plants.single_muscle.step import (
+    N_WORK,
+    advance,
+    hysteresis_kernels,
+    rest_contraction,
+    true_position,
+)
 
 OUTPUTS = ("contraction", "velocity", "pressure", "drive")
 COMMAND, LOAD, KELVIN, START_PRESSURE, HELD = range(5)

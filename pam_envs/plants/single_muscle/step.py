@@ -4,14 +4,17 @@ The sub-step: the regulator's pressure is exact at its end; the hysteresis, whic
 the pressures passed through, is then exact too, because within a sub-step the pressure is monotone;
 the motion is exact for the force linearised about the predicted mid-point with the effective
 pressure going straight from its old to its new value. So the step is of second order and has no
-stability limit from the stiffness of a light load.
+stability limit from the stiffness of a light load. The effective pressure is that of a hysteresis
+model between two scales of the pressure.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from pam_envs.constants import GRAVITY
+from pam_envs.hysteresis import protocol
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.history import N_HISTORY
@@ -20,7 +23,9 @@ from pam_envs.muscle.effective_area import tension, tension_slope
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regulator_step
 
-write_drive: Any = None  # a placeholder, see hysteresis_kernels
+# placeholders, see hysteresis_kernels
+write_drive: Any = None
+hysteresis_step: Any = None
 
 
 @kernel
@@ -166,3 +171,70 @@ def rest_contraction(fixed: Any, lane: int, drive: float, load: float) -> float:
         else:
             high = e
     return 0.5 * (low + high) * length
+
+
+@kernel
+def stretched(pressure: float, stretch: float, per_full: float) -> float:
+    """Return the pressure on the scale on which the friction is uniform.
+
+    ``g(p) = p (1 + b (1 - p / P))``: with ``b > 0`` the loop is wider at high pressure.
+    ``per_full`` is ``1 / P``.
+    """
+    return pressure * (1.0 + stretch * (1.0 - pressure * per_full))
+
+
+@kernel
+def unstretched(value: float, stretch: float, per_full: float) -> float:
+    """Return the pressure whose stretched value is ``value``."""
+    s = 1.0 + stretch
+    return 2.0 * value / (s + math.sqrt(max(0.0, s * s - 4.0 * stretch * value * per_full)))
+
+
+@kernel
+def loop_width(width_per_load: float, load: float) -> float:
+    """Return the factor on the hysteretic part at this load, from 0 to 1.2."""
+    return max(0.0, min(1.2, 1.0 + width_per_load * load))
+
+
+@kernel
+def pressure_itself(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
+    elements: int, work: Any,
+) -> None:  # fmt: skip
+    """Write the pressure as effective pressure."""
+    pressure, drive = rows[R.PRESSURE], rows[R.DRIVE]
+    for j in range(first, last):
+        drive[j] = pressure[j]
+
+
+@kernel
+def effective_pressure(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
+    elements: int, work: Any,
+) -> None:  # fmt: skip
+    """Write the effective pressure by a hysteresis model on the stretched scale."""
+    pressure, drive, stretch, full = (
+        rows[R.PRESSURE],
+        rows[R.DRIVE],
+        fixed[R.HYSTERESIS_STRETCH],
+        fixed[R.REGULATOR_MAX_PRESSURE],
+    )
+    load, per_load = rows[R.LOAD], fixed[R.HYSTERESIS_WIDTH_PER_LOAD]
+    inputs, output, per_full = work[0], work[1], work[2]
+    for j in range(first, last):
+        per_full[j] = 1.0 / full[j]
+        inputs[j] = stretched(pressure[j], stretch[j], per_full[j])
+    hysteresis_step(
+        inputs, output, rows, fixed, counts, table, elements, hysteresis, R.MODEL, R.STACK_COUNT,
+        R.MEMBER, first, last,
+    )  # fmt: skip
+    for j in range(first, last):
+        friction = inputs[j] - output[j]
+        value = inputs[j] - loop_width(per_load[j], load[j]) * friction
+        drive[j] = unstretched(value, stretch[j], per_full[j])
+
+
+def hysteresis_kernels(kind: str, name: str = "write_drive") -> dict[str, Any]:
+    """Return the kernels of a kind; ``name`` is the plant's placeholder for the whole."""
+    identity = protocol.model_of(kind).identity
+    return protocol.kernels(kind) | {name: pressure_itself if identity else effective_pressure}

@@ -13,7 +13,7 @@ from baselines.core.catalogue import make_controller
 from benchmarks.scoring.groups.elbow import NEAR
 from pam_envs.constants import GRAVITY
 from pam_envs.envs.elbow.env import largest_errors, model_row, signal_ranges
-from pam_envs.envs.elbow.program import estimate, pressures_for, within_reach
+from pam_envs.envs.elbow.kernels import estimate, pressures_for, within_reach
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.tasks.torque_stiffness import TorqueStiffness
 from tests.envs.cases import record
