@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 EXTRAS := plot,baselines,agents,bench,cluster,dev
 INSTALL := $(BIN)/python -m pip --disable-pip-version-check --no-input install -qq
-PLAIN := tests/hysteresis tests/kernels tests/plants/test_golden_plants.py $(addprefix tests/envs/, core/test_bits.py core/test_own_family.py test_golden_trajectories.py)
+PLAIN := tests/hysteresis tests/kernels tests/plants/test_golden_plants.py $(addprefix tests/envs/, core/test_bits.py core/test_everyday.py core/test_own_family.py test_golden_trajectories.py)
 
 # One thread each for linear algebra: more are slower on small problems, and change what is learned.
 export OMP_NUM_THREADS ?= 1

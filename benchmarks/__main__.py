@@ -283,6 +283,19 @@ def papers(json: Path | None = None) -> int:
     return 1 if any(figure.passed is False for figure in figures) else 0
 
 
+def energy(cycles: int = 2000, seed: int = 0) -> int:
+    """Print the net work of plants on random closed cycles of pressure and position.
+
+    Args:
+        cycles: Number of cycles for each plant and hysteresis.
+        seed: Seed of the cycles.
+    """
+    from benchmarks.energy import net_work
+
+    print(net_work(cycles, seed))
+    return 0
+
+
 def speed(
     only: tuple[str, ...] = (), rounds: int = 7, json: Path | None = None, strict: bool = False
 ) -> int:
@@ -445,6 +458,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "show-row": show_row,
     "tune": tune,
     "papers": papers,
+    "energy": energy,
     "speed": speed,
     "show": show,
     "diagnosis": diagnosis,

@@ -47,7 +47,7 @@ class ElbowAllocation(RowController):
 
     def initial_state(self, observation: ArrayLike) -> RowsState:
         """Return the hysteresis state of bundles without motion history."""
-        return self.friction.hysteresis.initial(row_count(observation))
+        return self.friction.initial(row_count(observation))
 
     def respond(self, observation: ArrayLike, state: RowsState) -> Prediction:
         """Return the action and the next state."""

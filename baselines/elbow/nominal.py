@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from baselines.core.controller import Array, Reader, encode_actions, reader
 from baselines.core.entry import ELBOW, Entry, Spec
-from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
+from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.mechanics.allocation import allocate
 from pam_envs.parameters import Signal
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
@@ -96,13 +96,14 @@ class ElbowFriction:
     """Friction of a nominal orthosis."""
 
     plant: ElbowOrthosis
-    hysteresis: Rows
+
+    def initial(self, rows: int) -> RowsState:
+        """Return the virgin states of a number of rows."""
+        return self.plant.hysteresis.initial(rows)
 
     def losses(self, view: ElbowView, state: RowsState) -> tuple[Shares, RowsState]:
         """Return the losses of both bundles' shapes [m^2], and the next hysteresis state."""
-        travel = self.plant.pulley.travel(view.angle)
-        follows, after = self.hysteresis.forward(travel, state)
-        return self.plant.friction(travel - follows), after
+        return self.plant.slide(view.angle, view.pressure, state)
 
     def torque(self, view: ElbowView, losses: Shares) -> Array:
         """Return the torque [N m] of friction at the sensed pressures."""
@@ -112,7 +113,7 @@ class ElbowFriction:
 
 def make_elbow_friction(plant: ElbowOrthosis, known: bool) -> ElbowFriction:
     """Return the friction of a nominal plant, or none if it is not ``known``."""
-    return ElbowFriction(plant, operator_of(plant.hysteresis.operator if known else None).rows())
+    return ElbowFriction(plant if known else plant.replace({"hysteresis.operator": None}))
 
 
 def pressures_for(

@@ -77,7 +77,7 @@ class ElbowPid(RowController):
         """Return the state that holds the present difference of pressures."""
         view = self.signals.read(observation)
         pid = pid_start(0.5 * np.diff(view.pressure, axis=0)[0], view.torque)
-        return ElbowPidState(pid, self.friction.hysteresis.initial(len(view.angle)))
+        return ElbowPidState(pid, self.friction.initial(len(view.angle)))
 
     def respond(self, observation: ArrayLike, state: ElbowPidState) -> Prediction:
         """Return the action and the next state."""

@@ -46,7 +46,7 @@ class KneeNominal:
     def _per_output(self) -> float:
         """Stiffness [N/m] over the hysteresis output."""
         muscle = self.plant.muscle
-        return muscle.gain * (1.0 if self.plant.hysteresis.operator else muscle.stiffness_ratio)
+        return muscle.gain * (1.0 if self.plant.hysteresis.scaled else muscle.stiffness_ratio)
 
     def stretch(self, angle: Array) -> Array:
         """Return the muscle's length above its shortest [m] at an angle [rad], at least 1 mm."""

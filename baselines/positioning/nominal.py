@@ -35,7 +35,7 @@ class LoadedMuscle:
     @cached_property
     def hysteresis(self) -> Rows:
         """The hysteresis at this load."""
-        return operator_of(self.plant.hysteresis.at_load(self.load)).rows()
+        return operator_of(self.plant.operator_at(self.load)).rows()
 
     @cached_property
     def _rest_strain(self) -> float:

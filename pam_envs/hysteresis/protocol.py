@@ -27,6 +27,8 @@ RowsState = tuple[NDArray[Any], ...]
 
 ELEMENTS = 12
 """Most elements of a model whose numbers are a column of the plant's parameters."""
+DRIVES = ("length", "pressure")
+"""Values of ``hysteresis_drive=``."""
 NUMBERS = 2 + 2 * ELEMENTS
 """Parameter rows that a plant keeps for its model: the slope, then the model's own."""
 
@@ -175,6 +177,8 @@ class HysteresisModel:
     """Value of ``hysteresis=`` that selects the model; ``kind`` unless given."""
     identity: ClassVar[bool] = False
     """True for the model whose output is its input."""
+    drive: ClassVar[str] = "pressure"
+    """``"length"`` for friction elements whose input is always a length (see ``slip``)."""
     kernels: ClassVar[Kernels]
     state_rows: ClassVar[int]
     """Rows of state of one operator."""
@@ -319,6 +323,24 @@ def kinds() -> tuple[str, ...]:
     """Return the values of ``hysteresis=``."""
     names = (kind for kind, model in MODELS.items() if model.choice in (None, kind))
     return tuple(sorted(names, key=lambda kind: MODELS[kind].identity))
+
+
+def kind_of(choice: str, drive: str) -> str:
+    """Return the kind of a choice of ``hysteresis=`` with a drive, ``DRIVES``.
+
+    A choice by itself stands for its models driven by pressure; a model that a plant file or a
+    script names by its kind stays what it is. Raises ValueError if there is none.
+    """
+    if drive not in DRIVES:
+        raise ValueError(f"hysteresis_drive = {drive!r}; choose 'length' or 'pressure'")
+    if drive == "pressure" or choice not in kinds() or MODELS[choice].identity:
+        return choice
+    for kind, model in MODELS.items():
+        if model.drive == drive and model.choice == choice:
+            return kind
+    raise ValueError(
+        f"hysteresis = {choice!r} has no model driven by length: give hysteresis_drive='pressure'"
+    )
 
 
 def model_of(kind: str) -> type[HysteresisModel]:

@@ -7,7 +7,8 @@ on every threshold); lag, dead time, slew rate, damping, moving mass and sensors
 Maxwell-slip (play operators on the pressure) and static law are fitted together by least squares
 on the mean contractions and on the three published loop widths. The Preisach map is then fitted to
 the effective pressures that this static law needs for the same readings, so that switching the
-hysteresis leaves the rest of the plant unchanged.
+hysteresis leaves the rest of the plant unchanged. Friction driven by length is fitted with its own
+static law (:mod:`~pam_envs.identification.length_friction`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from scipy.optimize import least_squares
 from pam_envs.data.tables import ContractionTable
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.identification import length_friction as length
 from pam_envs.identification.preisach_forc import PreisachFit, fit_preisach
 from pam_envs.plants.single_muscle.hysteresis import Hysteresis, Kind
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -105,7 +107,7 @@ def mean_cycles(table: ContractionTable, repeats: Any = None) -> Cycles:
 def quasi_static(plant: SingleMuscle, pressures: Array, load: float) -> Array:
     """Return the contractions [m] of a virgin muscle along slow changes of pressure [Pa]."""
     full = plant.regulator.max_pressure
-    operator = plant.hysteresis.at_load(load)
+    operator = plant.operator_at(load)
     drive = np.asarray(pressures, float)
     if operator is not None:
         felt, _ = operator.simulate(plant.hysteresis.stretched(drive, full))
@@ -209,8 +211,19 @@ def fit_cycles(cycles: Cycles, hysteresis: Kind = "maxwell_slip") -> CyclesFit:
     """Fit a muscle with that hysteresis to cycles."""
     if hysteresis == "none":
         return fit_maxwell_slip(cycles, hysteresis=False)[0]
+    if hysteresis in length.CELLS:
+        return fit_by_length(cycles, hysteresis)
     fit, _ = fit_maxwell_slip(cycles)
     return fit if hysteresis == "maxwell_slip" else fit_preisach_map(fit)
+
+
+def fit_by_length(cycles: Cycles, hysteresis: Kind, prior: Array | None = None) -> CyclesFit:
+    """Fit a muscle with friction driven by length; ``prior`` as of :func:`fit_maxwell_slip`."""
+    c = cycles
+    plant = length.fit_length_friction(
+        c.pressures, c.loads, c.contractions, c.widest(), hysteresis, WIDTH_WEIGHT, prior
+    )
+    return CyclesFit(plant, c, _model(plant, c) - c.contractions)
 
 
 def ensemble(
@@ -222,13 +235,18 @@ def ensemble(
     kept if its residual on all readings is at most a tenth larger than the best fit's.
     """
     random, kept = np.random.default_rng(seed), list[Mapping[str, Any]]()
-    _, start = fit_maxwell_slip(best.cycles, hysteresis != "none")
+    by_length = hysteresis in length.CELLS
+    start = None if by_length else fit_maxwell_slip(best.cycles, hysteresis != "none")[1]
     for _ in range(4 * members):
         if len(kept) == members:
             break
         repeats = random.choice(np.unique(table.repeat), 5)
         prior = random.dirichlet(np.full(6, 2.0))
-        fit, _ = fit_maxwell_slip(mean_cycles(table, repeats), hysteresis != "none", prior, start)
+        means = mean_cycles(table, repeats)
+        if by_length:
+            fit = fit_by_length(means, hysteresis, prior)
+        else:
+            fit, _ = fit_maxwell_slip(means, hysteresis != "none", prior, start)
         if hysteresis == "preisach":
             fit = fit_preisach_map(fit)
         missed = _model(fit.plant, best.cycles) - best.cycles.contractions
@@ -237,8 +255,16 @@ def ensemble(
     return tuple(kept)
 
 
+def _friction(drive: str) -> list[str]:
+    """Return the identified parameters that are particular to a drive of the hysteresis."""
+    if drive == "length":
+        names = ("friction", "limit_per_pressure", "limit_per_load")
+        return ["muscle.area_taper", *(f"hysteresis.{name}" for name in names)]
+    return ["hysteresis.stretch", "hysteresis.width_per_load"]
+
+
 def _member(plant: SingleMuscle) -> Mapping[str, Any]:
-    names = [*(f"muscle.{k}" for k in STATIC), "hysteresis.stretch", "hysteresis.width_per_load"]
+    names = [*(f"muscle.{k}" for k in STATIC), *_friction(plant.hysteresis.drive)]
     values: dict[str, Any] = {name: plant.value(name) for name in names}
     if plant.hysteresis.operator is not None:
         values["hysteresis.operator"] = plant.hysteresis.operator
@@ -250,8 +276,8 @@ def identify_mas10(
 ) -> tuple[SingleMuscle, CyclesFit]:
     """Return the shipped MAS-10 plant with that hysteresis, and its fit."""
     fit = fit_cycles(mean_cycles(table), hysteresis)
-    names = [f"muscle.{k}" for k in STATIC] + ["muscle.area_taper"]
-    names += ["hysteresis.stretch", "hysteresis.width_per_load"] if hysteresis != "none" else []
+    names = {*(f"muscle.{k}" for k in (*STATIC, "area_taper"))}
+    names |= set(_friction(fit.plant.hysteresis.drive)) if hysteresis != "none" else set()
     plant = dataclasses.replace(
         fit.plant,
         provenance={name: ("identified", _SOURCE) for name in names},
@@ -302,7 +328,8 @@ def identifiability(fit: CyclesFit, standard_error: float = 6.7e-5) -> Identifia
         raise ValueError(f"a Maxwell-slip fit is needed, this one has {plant.hysteresis.kind!r}")
     from pam_envs.plants.single_muscle.rows import PARAMETERS
 
-    names = [n for n in PARAMETERS if not n.startswith(("position", "pressure"))]
+    other = ("position", "pressure", *_friction("length")[1:])
+    names = [n for n in PARAMETERS if not n.startswith(other)]
     columns = []
     for name in names:
         value = plant.value(name)

@@ -42,19 +42,17 @@ class HangingMuscle:
 
         From the contraction of the straight joint, where its hysteresis is virgin.
         """
-        operator: Any = self.plant.hysteresis.operator
+        held, operator = self.plant.hysteresis, self.plant.hysteresis.model
         middle = float(self.plant.lever.contraction(0.0, self.plant.muscle.rest_length)[0])
         state, made = operator.initial_state(), []
         for pressure in np.asarray(pressures, float):
             given = (pressure, middle, state)
             x = float(brentq(self._spare, LOWEST, HIGHEST, given, xtol=1e-13))
-            state = operator.step(x - middle, state)[1]
+            state = held.friction(x - middle, pressure, state)[1]
             made.append(x)
         return np.array(made)
 
     def _spare(self, x: float, pressure: float, middle: float, state: Any) -> float:
         """Return the force of the muscle in excess of its load [N]."""
-        hysteresis, operator = self.plant.hysteresis, self.plant.hysteresis.operator
-        friction = hysteresis.width * (hysteresis.base + hysteresis.rate * pressure)
-        lag = x - middle - float(operator.step(x - middle, state)[0])  # type: ignore[union-attr]
-        return float(self.plant.muscle.law(pressure, x)) - friction * lag - self.load
+        friction, _ = self.plant.hysteresis.friction(x - middle, pressure, state)
+        return float(self.plant.muscle.law(pressure, x)) - float(friction) - self.load

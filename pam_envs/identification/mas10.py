@@ -12,6 +12,7 @@ from pam_envs.data.tables import load_contraction_table
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.none import NoHysteresis
 from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.slip import PreisachSlip, StraightSlip
 from pam_envs.identification import contraction_cycles as cycles
 from pam_envs.identification.preisach_forc import congruency_error
 from pam_envs.plants.core import plant_file
@@ -25,7 +26,9 @@ MISSED = (
 )
 """Structure of the residuals that the model does not represent."""
 
-STOCK = (PlayOperator.kind, Preisach.kind, NoHysteresis.kind)
+STOCK = (
+    StraightSlip.kind, PreisachSlip.kind, PlayOperator.kind, Preisach.kind, NoHysteresis.kind,
+)  # fmt: skip
 """Kinds of hysteresis that are identified on the tables."""
 
 
@@ -57,13 +60,15 @@ def _rank(fit: cycles.CyclesFit) -> str:
     if fit.plant.hysteresis.kind == PlayOperator.kind:
         found = cycles.identifiability(fit)
         return f"{found.rank} of {len(found.names)} parameters"
+    if fit.plant.hysteresis.drive == "length":
+        return "see the prior"
     return f"{len(cycles.STATIC)} of {len(cycles.STATIC)} static parameters"
 
 
 def identify_all(
     folder: Path, members: int = 8, say: Callable[[str], None] = lambda line: None
 ) -> str:
-    """Identify the three plants, write them to ``folder`` and return the report (Markdown)."""
+    """Identify the plants, write them to ``folder`` and return the report (Markdown)."""
     table = load_contraction_table()
     floor = 1e3 * cycles.repeatability_floor(table)
     lines = [

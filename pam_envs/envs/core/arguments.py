@@ -18,8 +18,9 @@ from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, check_whole
 from pam_envs.envs.core.step import MOST_PREVIEW
 from pam_envs.envs.core.vector_env import PlantVectorEnv
-from pam_envs.hysteresis.protocol import kinds, model_of
+from pam_envs.hysteresis.protocol import DRIVES, kind_of, kinds, model_of
 from pam_envs.parameters import check, declarations
+from pam_envs.plants.core.everyday import everyday
 from pam_envs.wording import near
 
 T = TypeVar("T")
@@ -50,6 +51,9 @@ class Common:
     ----------
     hysteresis : {"maxwell_slip", "preisach", "none"}, optional
         Hysteresis model of the muscles. Default: that of ``plant``, or Maxwell-slip.
+    hysteresis_drive : {"length", "pressure"}, optional
+        Input of the hysteresis: friction driven by length is passive, the papers' forms create
+        energy. Default: that of ``plant``, or "pressure".
     plant : plant or path, optional
         Plant of the environment's family, as an object or a YAML file. Default: the published one.
     reference : str or array_like
@@ -60,10 +64,11 @@ class Common:
         Control periods between them.
     episode_seconds : float
         Duration of an episode [s], 0.02 to 3,600.
-    randomize : bool or mapping
+    randomize : bool, "everyday" or mapping
         True: every episode draws one of the equally good fits (where there are several) and the
-        assumed parameters within their declared ranges. A mapping {"mass.damping": (low, high)}:
-        only those.
+        assumed parameters within their declared ranges. "everyday": the effects of a normal day,
+        and one of those fits (:mod:`~pam_envs.plants.core.everyday`). A mapping {"mass.damping":
+        (low, high)}: only those.
     normalize : bool
         Observation and action in [-1, 1], or SI.
     render_mode : {None, "rgb_array", "human"}
@@ -77,6 +82,7 @@ class Common:
     preview_stride: int
     episode_seconds: float
     hysteresis: str | None = None
+    hysteresis_drive: str | None = None
     plant: Any = None
     randomize: Any = False
     normalize: bool = True
@@ -92,12 +98,17 @@ class Common:
         check_number("episode_seconds", self.episode_seconds, 0.02, 3600.0, "s")
 
     def plant_of(self, kind: type[T], default: Callable[[Any], T]) -> T:
-        """Return the plant that ``plant`` and ``hysteresis`` name; default: of a hysteresis."""
-        plant, hysteresis = self.plant, self.hysteresis
+        """Return the plant that ``plant`` and ``hysteresis`` name; default: of a hysteresis.
+
+        ``default`` takes the hysteresis and its drive.
+        """
+        plant, hysteresis, drive = self.plant, self.hysteresis, self.hysteresis_drive
+        if drive is not None:
+            check_choice("hysteresis_drive", drive, DRIVES)
         if hysteresis is not None:
             check_choice("hysteresis", hysteresis, kinds())
         if plant is None:
-            return default(hysteresis or "maxwell_slip")
+            return default(kind_of(hysteresis or "maxwell_slip", drive or "pressure"))
         made: Any = kind.from_yaml(plant) if isinstance(plant, (str, Path)) else plant  # type: ignore[attr-defined]
         if not isinstance(made, kind):
             raise ValueError(
@@ -111,6 +122,11 @@ class Common:
             raise ValueError(
                 f"hysteresis = {hysteresis!r} but the plant's hysteresis is {own!r}; leave "
                 "hysteresis out, or give a plant identified with that hysteresis"
+            )
+        if drive not in (None, made.hysteresis.drive):  # type: ignore[attr-defined]
+            raise ValueError(
+                f"hysteresis_drive = {drive!r} but the plant's hysteresis has another; leave "
+                "hysteresis_drive out, or give a plant with that hysteresis"
             )
         return made
 
@@ -207,9 +223,12 @@ class Common:
             return {}
         if isinstance(randomize, Mapping):
             return dict(randomize)
+        if randomize == "everyday":
+            return dict(everyday(plant))
         if randomize is not True:
             raise ValueError(
-                f"randomize = {randomize!r} must be True, False or a mapping from parameter to "
+                f"randomize = {randomize!r} must be True, False, 'everyday' or a mapping from "
+                "parameter to "
                 f"(low, high), for example {which.example}"
             )
         ranges = {}

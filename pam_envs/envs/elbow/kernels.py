@@ -25,6 +25,7 @@ from pam_envs.plants.elbow_orthosis.step import (
     SENSED_PRESSURE,
     advance,
     begin_lane,
+    operators,
     replacements,
     start_hysteresis,
 )
@@ -315,7 +316,7 @@ def begin_elbow(
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, valves: str, extended: bool = False) -> Kernels:
     """Return the kernels for a hysteresis model and valves, plain or with effects."""
-    rows = L.HYSTERESIS + state_rows(kind)
+    rows = L.HYSTERESIS + operators(kind) * state_rows(kind)
     return Kernels(
         "elbow",
         kernels_for,

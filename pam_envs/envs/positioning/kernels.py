@@ -24,14 +24,16 @@ from pam_envs.muscle.effective_area import volume
 from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import replacements
+from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.step import (
     N_WORK,
     advance,
     begin_effects,
-    hysteresis_kernels,
+    begin_rest,
     rest_contraction,
     seen_position,
     seen_pressure,
+    slide_to_rest,
     true_position,
 )
 from pam_envs.references import trajectory as T
@@ -137,14 +139,14 @@ def begin_muscle(
     begin = peak * uniform(key_a, key_b, START, 4)
     rows[R.REST][j] = rest_contraction(fixed, j, 0.0, load)
     elements = choices[CHOICE.elements]
+    begin_rest(rows, fixed, counts, tables, HYSTERESIS, elements, j)
     for pressure in (0.0, peak, begin):
         rows[R.PRESSURE][j] = pressure
         write_drive(rows, fixed, counts, tables, HYSTERESIS, j, j + 1, elements, work)
+        slide_to_rest(rows, fixed, counts, tables, HYSTERESIS, elements, j)
     for k in range(N_HISTORY):
         rows[R.HISTORY + k][j] = begin
     rows[R.SET_POINT][j] = rows[R.OLD_SET_POINT][j] = rows[R.OLD_PRESSURE][j] = begin
-    rows[R.CONTRACTION][j] = rest_contraction(fixed, j, rows[R.DRIVE][j], load)
-    rows[R.VELOCITY][j] = 0.0
     rows[R.OLD_AIR][j] = air_in_muscle(rows, fixed, j)
     begin_effects(rows, fixed, j)
     family = choices[CHOICE.reference]

@@ -119,8 +119,7 @@ class InverseFeedforward:
         """Return the action for an observation."""
         load = float(self.signals.decode(observation, "load"))
         if self.inverse is None:
-            full = self.plant.regulator.max_pressure
-            self.inverse = self.plant.hysteresis.inverse(load, full)
+            self.inverse = self.plant.hysteresis_inverse(load)
             self.state = self.inverse.initial_state((1,))
         reference = self.signals.decode(observation, "reference")
         drive = np.atleast_1d(self.plant.drive_for(reference, load))

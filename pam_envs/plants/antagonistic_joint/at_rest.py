@@ -110,17 +110,16 @@ def muscle_torque(
     straight = lever.contraction(0.0, muscle.rest_length)
     at = lever.contraction(angle, muscle.rest_length) - straight
     ways = np.sign(lever.contraction(angle + 1e-3, muscle.rest_length) - straight - at)
-    lines = [
-        local_branch(friction.operator, float(x), float(x - way * 1e-12 if x == 0.0 else 0.0),
-                     branch, SIZE)
-        for x, way in zip(at, ways, strict=True)
-    ]  # fmt: skip
+    starts = np.where(at == 0.0, -1e-12 * ways, 0.0)
     gains = muscle.gain * (1.0 + np.array([1.0, -1.0]) * muscle.imbalance)
 
     def torque(phi: float, speed: float, pressures: Array) -> float:
         x, rate = lever.contraction(phi, muscle.rest_length), lever.rate(phi)
-        felt = np.array([line(v) for line, v in zip(lines, x - straight, strict=True)])
-        drag = friction.width * (friction.base + friction.rate * pressures) * (x - straight - felt)
+        felt = np.array([
+            local_branch(friction.at_pressure(float(p)), float(a), float(start), branch, SIZE)(v)
+            for p, a, start, v in zip(pressures, at, starts, x - straight, strict=True)
+        ])  # fmt: skip
+        drag = friction.stiffness(pressures) * (x - straight - felt)
         slide = muscle.viscosity * pressures * -rate * speed / muscle.rest_length
         forces = gains * muscle.law(pressures, x) - drag - slide
         return float(-np.sum(np.maximum(0.0, forces) * rate))

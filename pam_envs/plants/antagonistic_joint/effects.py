@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from pam_envs.hysteresis import protocol
 from pam_envs.kernels.build import kernel
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.pair import N_PAIRS, PAIR, pair_rows
+from pam_envs.plants.antagonistic_joint.pair import N_PAIRS, PAIR, friction_kernels, pair_rows
 from pam_envs.plants.core.muscle_path import PATH_STATE, begin_path, path_step
 from pam_envs.plants.core.sensors import effect_kernels
 
@@ -57,7 +56,7 @@ def pair_kernels(kind: str, layout: Any, pairs: int, effects: int | None) -> dic
 
     ``effects`` is the first row of the state of the effects; None for a plain plant.
     """
-    found = protocol.kernels(kind) | {"PAIR": pair_rows(layout, effects), "N_PAIRS": pairs}
+    found = friction_kernels(kind) | {"PAIR": pair_rows(layout, effects), "N_PAIRS": pairs}
     found["N_OPERATORS"] = 2 * pairs
     if effects is None:
         return found

@@ -1,25 +1,32 @@
 """Hysteresis of the muscles of a joint: friction driven by their contraction.
 
-The threads of the braid slide on each other as the length changes, not as the pressure does. An
-operator of slope 1 follows the contraction; its lag, times a friction stiffness that
-grows with the pressure pressing the threads together, is the friction force:
+The threads of the braid slide on each other as the length changes. An operator of slope 1 follows
+the contraction; its lag, times a stiffness, is the friction force. The pressure presses the threads
+together, in one of two ways:
 
-    F = F(p, e) - width (base + rate p) (e - operator(e))
+    length:    F = F(p, e) - width (base + rate p0) lag(e),   limits in proportion to base + rate p
+    pressure:  F = F(p, e) - width (base + rate p) lag(e)
 
-With plays, the lag is a sum of Maxwell-slip elements. The contraction is counted from that of the
-straight joint, at which a virgin hysteresis is at rest.
+Both slip at the same force, in proportion to ``base + rate p``. In the first, elements of constant
+stiffness slip at a distance that grows with pressure, which is passive; they are alike at
+``p0 = REFERENCE_PRESSURE``. In the second the pressure changes the force of friction that is stuck,
+and so creates or destroys energy. With plays, the lag is a sum of Maxwell-slip elements. The
+contraction is counted from that of the straight joint, at which a virgin hysteresis is at rest.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.protocol import preset
+from pam_envs.hysteresis.protocol import HysteresisModel, preset
+from pam_envs.hysteresis.slip import SlipModel
 from pam_envs.parameters import assumed
 from pam_envs.plants.core.plant import OperatorComponent
 
@@ -29,6 +36,8 @@ LEVELS = 89
 """Of its map: cells of half a per cent."""
 PLAYS = 8
 """Plays of the preset."""
+REFERENCE_PRESSURE = 3e5
+"""Pressure [Pa] at which friction of either drive is the same."""
 ANGLES = 0.62
 """Angle [rad] that the reduced plant's hysteresis spans on either side."""
 ANGLE_LEVELS = 63
@@ -50,6 +59,37 @@ class JointHysteresis(DriveEffects, OperatorComponent):
     )
     base: float = assumed(100.0, "N", 0.0, 1e5, _SHARE)
     rate: float = assumed(1.7e-3, "N/Pa", 0.0, 1.0, _SIZE)
+
+    def slip(self, pressure: ArrayLike) -> NDArray[np.float64]:
+        """Return the slip force at pressures [Pa] over that at ``REFERENCE_PRESSURE``."""
+        full = self.base + self.rate * REFERENCE_PRESSURE
+        return np.asarray((self.base + self.rate * np.asarray(pressure, float)) / full)
+
+    def stiffness(self, pressure: ArrayLike) -> NDArray[np.float64]:
+        """Return the friction over the lag [N] at pressures [Pa]."""
+        full = self.width * (self.base + self.rate * REFERENCE_PRESSURE)
+        grown = np.ones(np.shape(pressure)) if self.drive == "length" else self.slip(pressure)
+        return np.asarray(full * grown)
+
+    def at_pressure(self, pressure: float) -> HysteresisModel:
+        """Return the operator at a constant pressure [Pa]."""
+        model = self.model
+        return model.limited(float(self.slip(pressure))) if isinstance(model, SlipModel) else model
+
+    def friction(
+        self, contraction: ArrayLike, pressure: ArrayLike, state: Any
+    ) -> tuple[NDArray[np.float64], Any]:
+        """Return the friction [N] at contractions beyond the straight joint's, and the state after.
+
+        ``pressure`` [Pa] has the shape of the contractions, or broadcasts with it.
+        """
+        x, model = np.asarray(contraction, float), self.model
+        if isinstance(model, SlipModel):
+            lag, after = model.lag(x, state, self.slip(pressure))
+        else:
+            output, after = model.step(x, state)
+            lag = x - output
+        return np.asarray(self.stiffness(pressure) * lag), after
 
 
 def contraction_plays() -> PlayOperator:

@@ -7,11 +7,14 @@ from collections import namedtuple
 from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
+from pam_envs.hysteresis import protocol
+from pam_envs.hysteresis.slip import LIMIT, STATE_ROWS
 from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.mechanics.antagonistic_lever import span, squares
 from pam_envs.muscle.force_map import force_terms, inner_volume
 from pam_envs.plants.antagonistic_joint import rows as K
+from pam_envs.plants.antagonistic_joint.hysteresis import REFERENCE_PRESSURE
 from pam_envs.plants.core.muscle_path import regulated
 from pam_envs.plants.core.sensors import read_sensors
 
@@ -21,6 +24,8 @@ N_PAIRS = 1  # placeholder: number of joints
 # placeholders, filled in for each plant and each hysteresis
 hysteresis_lag: Any = None
 hysteresis_peek: Any = None
+set_limits: Any = None
+friction_of: Any = None
 move: Any = None
 report_state: Any = None
 
@@ -30,6 +35,15 @@ ROWS = (
 )
 """Rows of a plant that these kernels read: of joint ``k`` the row of the first and ``k``, of
 muscle ``m`` that of the first and ``m``."""
+
+
+def friction_kernels(kind: str) -> dict[str, Any]:
+    """Return the kernels of the friction of a kind of hysteresis by their placeholders."""
+    by_length = protocol.model_of(kind).drive == "length"
+    return protocol.kernels(kind) | {
+        "set_limits": write_limits if by_length else leave_limits,
+        "friction_of": constant_friction if by_length else friction_at,
+    }
 
 
 def pair_rows(layout: Any, effects: int | None) -> Any:
@@ -103,11 +117,31 @@ def contract(rows: Any, fixed: Any, j: int, k: int, angle: float) -> None:
 
 
 @kernel
+def leave_limits(
+    rows: Any, fixed: Any, state: int, m: int, operators: int, first: int, last: int
+) -> None:
+    """Do nothing: the friction's stiffness depends on pressure, its limits do not."""
+
+
+@kernel
+def write_limits(
+    rows: Any, fixed: Any, state: int, m: int, operators: int, first: int, last: int
+) -> None:
+    """Write the limits of the friction of muscles from ``m`` on, as their slip force grows."""
+    for k in range(operators):
+        limit, pressure = rows[state + k * STATE_ROWS + LIMIT], rows[PAIR.effective + m + k]
+        for j in range(first, last):
+            base, rate = fixed[K.HYSTERESIS_BASE][j], fixed[K.HYSTERESIS_RATE][j]
+            limit[j] = (base + rate * pressure[j]) / (base + rate * REFERENCE_PRESSURE)
+
+
+@kernel
 def lag_of(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, operators: int,
     first: int, last: int,
 ) -> None:  # fmt: skip
     """Move the hysteresis of some operators in some lanes to their inputs, and write their lags."""
+    set_limits(rows, fixed, hysteresis, 0, operators, first, last)
     hysteresis_lag(
         rows, fixed, counts, table, hysteresis, elements, PAIR.at, PAIR.lag, operators, PAIR.model,
         K.STACK_COUNT, K.MEMBER, first, last,
@@ -120,6 +154,7 @@ def peek_at(
     operators: int, first: int, last: int,
 ) -> None:  # fmt: skip
     """Write lags and sticking of operators from ``m`` on in some lanes, whose states stay."""
+    set_limits(rows, fixed, hysteresis, m, operators, first, last)
     hysteresis_peek(
         rows, fixed, counts, table, hysteresis, elements, PAIR.at + m, PAIR.lag + m,
         PAIR.stick + m, operators, PAIR.model, K.STACK_COUNT + m, K.MEMBER, first, last,
@@ -153,8 +188,14 @@ def terms_of(fixed: Any, j: int, contraction: float) -> tuple[float, float, floa
 
 
 @kernel
-def friction_of(fixed: Any, j: int, pressure: float) -> float:
-    """Return the friction over the hysteresis lag [N]."""
+def constant_friction(fixed: Any, j: int, pressure: float) -> float:
+    """Return the stiffness of the friction elements [N], whose limits have the pressure."""
+    return friction_at(fixed, j, REFERENCE_PRESSURE)
+
+
+@kernel
+def friction_at(fixed: Any, j: int, pressure: float) -> float:
+    """Return the friction over the hysteresis lag [N], in proportion to its slip force."""
     return fixed[K.HYSTERESIS_WIDTH][j] * (
         fixed[K.HYSTERESIS_BASE][j] + fixed[K.HYSTERESIS_RATE][j] * pressure
     )

@@ -73,6 +73,11 @@ class AntagonisticJoint(PairPlant, rows=K):
     def _check(self) -> None:
         """Refuse angles out of reach, and a motion that the sub-steps cannot follow."""
         super()._check()
+        if self.dynamics == "reduced" and self.hysteresis.drive == "length":
+            raise ValueError(
+                "dynamics = 'reduced' has the hysteresis of the paper, from command to angle: give "
+                "hysteresis_drive='pressure'"
+            )
         link = self.link
         full = float(np.max(self.stiffness(link.stop, FULL_PRESSURE, FULL_PRESSURE)))
         self.check_phase(

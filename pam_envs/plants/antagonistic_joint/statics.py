@@ -6,6 +6,7 @@ The static load check compares them with the weights at the angles of a plan.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from pam_envs.mechanics.antagonistic_lever import SIDES, AntagonisticLever
 from pam_envs.muscle.force_map import ForceMap
 from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis
 from pam_envs.plants.antagonistic_joint.link import Stage, StagePoint
+from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.plants.core.plant import Plant
 from pam_envs.pneumatics.regulator import JointRegulator
 
@@ -110,6 +112,28 @@ class PairPlant(Plant):
         p = np.stack(np.broadcast_arrays(pressure_a, pressure_b, x[..., 0])[:2], axis=-1)
         gains = self.muscle.gain * (1.0 + np.array(SIDES) * self.muscle.imbalance)
         return -np.sum(gains * self.muscle.force(p, x) * self.lever.rate(angle), axis=-1)
+
+    def imposed_muscles(self, cycles: int) -> ImposedMuscles:
+        """Return a pair under imposed pressures (2, n) [Pa] and an angle [rad], always taut.
+
+        Muscles that are slack in the plant push here, so that the work is that of the law.
+        """
+        length, sides = self.muscle.rest_length, np.array(SIDES)
+        gains = self.muscle.gain * (1.0 + sides * self.muscle.imbalance)
+        straight = self.lever.contraction(0.0, length)
+        start = self.hysteresis.model.initial_state((cycles,))
+
+        def law(p: Array, angle: Array) -> Array:
+            forces = gains * self.muscle.law(p.T, self.lever.contraction(angle, length))
+            return -np.sum(forces * self.lever.rate(angle), axis=-1)
+
+        def force(p: Array, angle: Array, states: Any) -> tuple[Array, Any]:
+            at, rate = self.lever.contraction(angle, length) - straight, self.lever.rate(angle)
+            moved = [self.hysteresis.friction(at[:, k], p[k], states[k]) for k in range(2)]
+            drag = sum(moved[k][0] * rate[:, k] for k in range(2))
+            return law(p, angle) + drag, tuple(after for _, after in moved)
+
+        return ImposedMuscles(force, law, (start, start))
 
     def stiffness(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
         """Return minus the derivative of the torque by the angle [N m/rad] at held pressures."""

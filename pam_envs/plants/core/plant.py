@@ -24,6 +24,7 @@ from pam_envs.hysteresis.protocol import (
 from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
+from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.wording import near
 
 
@@ -52,6 +53,11 @@ class OperatorComponent:
     def kind(self) -> str:
         """Registered kind of the operator, which selects the kernels."""
         return self.model.kind
+
+    @property
+    def drive(self) -> str:
+        """Input of the hysteresis, as declared by its operator: ``"length"`` or ``"pressure"``."""
+        return self.model.drive
 
     @property
     def choice(self) -> str:
@@ -255,6 +261,10 @@ class Plant:
     def module(cls, name: str) -> Any:
         """Return a module of the plant's folder: ``"rollout"`` or ``"at_rest"``."""
         return import_module(f"{cls.__module__.rpartition('.')[0]}.{name}")
+
+    def imposed_muscles(self, cycles: int) -> ImposedMuscles:
+        """Return the muscles under imposed pressures and position (``core.passivity``)."""
+        raise NotImplementedError
 
     def linearise(self, **point: Any) -> Any:
         """Return the ``control.StateSpace`` about a point of rest (``core.linearise``)."""

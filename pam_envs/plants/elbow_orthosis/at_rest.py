@@ -37,13 +37,15 @@ def at_rest(
     held = np.array(pressures or (0.5 * plant.full_pressure,) * 2, float)
     travel = float(pulley.travel(theta))
     start = travel - 1e-12 if travel == 0.0 else 0.0
-    line = local_branch(plant.hysteresis.operator, travel, start, branch, 1e-6)
+    limits = plant.friction_limits(held)
+    lines = [local_branch(operator, travel, start, branch, 1e-6)
+             for operator in plant.hysteresis.at_limits(limits)]  # fmt: skip
     weight = link.mass * link.centre + wearer.mass * wearer.centre
 
     def torque(q: float, p: Array) -> float:
         at = pulley.travel(q)
         shape_a, shape_b, _, _ = plant.geometry(q)
-        less_a, less_b = plant.friction(at - line(at))
+        less_a, less_b = plant.friction(np.array([at - line(at) for line in lines]), p)
         factor_a, factor_b = plant.coefficients(*p)
         forces = factor_a * (shape_a - less_a), factor_b * (shape_b - less_b)
         return float(pulley.torque(*(np.maximum(0.0, force) for force in forces)))

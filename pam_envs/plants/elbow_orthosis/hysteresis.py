@@ -7,10 +7,12 @@ each bundle
 
     P = X [(L_n - C) (C_max - C) - s],    s = loop L_n C_max lag / (2 largest lag)
 
-with the lag of that bundle's own contraction. ``loop`` is the largest difference of the forces
-during stretch and release of the bundle, over its force at nominal length, at any one pressure.
-This is our reading of the paper's 7.5 %, which the paper reports for loops that overload the
-muscles beyond their nominal length; it says that shorter loops have less.
+with the lag of that bundle's own contraction. Driven by length, the friction ``X s`` has the
+stiffness of ``REFERENCE_PRESSURE`` and slips at distances in proportion to ``X``, so that it slips
+at the same force and is passive; each bundle then has an operator of its own. ``loop`` is the
+largest difference of the forces during stretch and release of the bundle, over its force at nominal
+length, at any one pressure. This is our reading of the paper's 7.5 %, which the paper reports for
+loops that overload the muscles beyond their nominal length; it says that shorter loops have less.
 
 The two presets are different hysteresis models, not two forms of one. Plays act equally at every
 angle of the elbow; their thresholds are spread evenly on a logarithmic scale. The Preisach preset
@@ -31,7 +33,8 @@ from numpy.typing import NDArray
 from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.hysteresis.protocol import preset
+from pam_envs.hysteresis.protocol import ELEMENTS, HysteresisModel, RowsState, preset
+from pam_envs.hysteresis.slip import PreisachSlip, SlipModel
 from pam_envs.parameters import published
 from pam_envs.plants.antagonistic_joint.hysteresis import PLAYS
 from pam_envs.plants.core.plant import OperatorComponent
@@ -44,6 +47,8 @@ SLIDING = 0.8
 """Part of the slope that has hysteresis, of either preset."""
 HALF_GAP = 7.75e-3
 """Largest half-gap [m] of the Preisach preset's relays: of 15.5 cells of its map."""
+REFERENCE_PRESSURE = 2e5
+"""Pressure [Pa] at which friction of either drive is the same."""
 MIDDLE, REST = 0.3, 9e-3
 """Density of its relays in the middle over that from ``REST`` [m] on either side. Relays so far out
 are all within the paper's stroke of 66 mm, which is why the loop there is the largest one."""
@@ -71,6 +76,18 @@ class ElbowHysteresis(DriveEffects, OperatorComponent):
     def largest_lag(self) -> float:
         """Largest lag [m] of the operator, after a long way in one direction."""
         return self.model.largest_lag
+
+    def at_limits(self, limits: NDArray[np.float64]) -> list[HysteresisModel]:
+        """Return the operators of both bundles at constant limits, shape (2, ...)."""
+        model = self.model
+        if isinstance(model, SlipModel):
+            return [model.limited(float(np.ravel(limit)[0])) for limit in limits]
+        return [model, model]
+
+    def initial(self, rows: int) -> RowsState:
+        """Return the virgin states of a number of rows, for :meth:`ElbowOrthosis.slide`."""
+        state = self.model.rows().initial(rows)
+        return state * 2 if self.drive == "length" else state  # type: ignore[no-any-return]
 
 
 def travel_plays() -> PlayOperator:
@@ -107,6 +124,14 @@ def travel_relays() -> Preisach:
     return Preisach(-WIDEST, WIDEST, tuple(map(tuple, table)), start="virgin")
 
 
+def travel_slips() -> PreisachSlip:
+    """Return relays of the same density, of twelve half-gaps."""
+    gaps = (np.arange(ELEMENTS) + 0.5) * HALF_GAP / ELEMENTS
+    cells = (np.arange(LEVELS - 1) + 0.5) * 2.0 * WIDEST / (LEVELS - 1) - WIDEST
+    share = tuple(float(d) for d in SLIDING / ELEMENTS * _relays(cells))
+    return PreisachSlip(-WIDEST, WIDEST, tuple(gaps), (share,) * ELEMENTS)
+
+
 @lru_cache(maxsize=4)
 def elbow_hysteresis(kind: str) -> ElbowHysteresis:
     """Return the preset hysteresis of a kind; all have loops of the same largest width.
@@ -118,4 +143,6 @@ def elbow_hysteresis(kind: str) -> ElbowHysteresis:
     """
     if kind == Preisach.kind:
         return ElbowHysteresis(travel_relays())
+    if kind == PreisachSlip.kind:
+        return ElbowHysteresis(travel_slips())
     return ElbowHysteresis(preset(kind, travel_plays(), -WIDEST, WIDEST, LEVELS, "virgin"))

@@ -18,19 +18,25 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.hysteresis.protocol import Usage
+from pam_envs.hysteresis.slip import SlipModel
 from pam_envs.mechanics.forearm import OrthosisLink, Wearer
 from pam_envs.mechanics.pulley import Pulley
 from pam_envs.muscle.quadratic_bundle import QuadraticBundle
+from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.elbow_orthosis import rows as K
-from pam_envs.plants.elbow_orthosis.hysteresis import ElbowHysteresis, elbow_hysteresis
+from pam_envs.plants.elbow_orthosis.hysteresis import (
+    REFERENCE_PRESSURE,
+    ElbowHysteresis,
+    elbow_hysteresis,
+)
 from pam_envs.pneumatics.on_off_pair import OnOffValve
 from pam_envs.pneumatics.regulator import BundleRegulator
 from pam_envs.sensing.sensor import AngleSensor, GaugeSensor
@@ -227,15 +233,58 @@ class ElbowOrthosis(Plant, rows=K):
         moment = self.link.mass * self.link.centre * self.link.gravity
         return np.asarray(moment * np.sin(angle))
 
-    def friction(self, lag: ArrayLike) -> tuple[Array, Array]:
+    def friction(self, lag: ArrayLike, pressure: Any = None) -> tuple[Array, Array]:
         """Return the share of friction [m2] in the shapes of bundles a and b.
 
         ``lag`` [m] is the travel (``pulley.travel(angle)``) less the output of
-        ``hysteresis.operator``: with hysteresis a force is ``X (shape - friction)``.
+        ``hysteresis.operator``: with hysteresis a force is ``X (shape - friction)``. With the
+        ``pressure`` [Pa] of both bundles, shape (2, ...), so are the lags; friction driven by
+        length needs them.
         """
         part = 0.5 * self.hysteresis.loop * np.asarray(lag, float) / self.hysteresis.largest_lag
         a, b = self.bundle_a, self.bundle_b
-        return -part * a.shape(0.0), part * b.shape(0.0)
+        if self.hysteresis.drive == "length":
+            part = part / self.friction_limits(pressure)
+        part_a, part_b = (part, part) if pressure is None else part
+        return -part_a * a.shape(0.0), part_b * b.shape(0.0)
+
+    def friction_limits(self, pressure: Any) -> Array:
+        """Return the slip forces over those at ``REFERENCE_PRESSURE``, shape (2, ...)."""
+        now = self.coefficients(*np.asarray(pressure, float))
+        there = self.coefficients(*np.full((2, 1), REFERENCE_PRESSURE))
+        return np.array([x / y for x, y in zip(now, there, strict=True)])
+
+    def slide(self, angle: ArrayLike, pressure: ArrayLike, state: Any) -> tuple[Any, Any]:
+        """Return the shares of :meth:`friction` after motion to angles [rad], and the state.
+
+        ``pressure`` [Pa] has the shape (2, ...). The state of friction driven by length is one of
+        both bundles, a tuple; that of others the operator's own. Start from
+        ``hysteresis.initial(n)``.
+        """
+        travel, model = self.pulley.travel(angle), self.hysteresis.model
+        if isinstance(model, SlipModel):
+            limits = self.friction_limits(pressure)
+            moved = [model.lag(travel, s, limit) for s, limit in zip(state, limits, strict=True)]
+            lags = np.array([lag for lag, _ in moved])
+            return self.friction(lags, pressure), tuple(after for _, after in moved)
+        follows, after = model.rows().forward(np.asarray(travel), state)
+        return self.friction(travel - follows), after
+
+    def imposed_muscles(self, cycles: int) -> ImposedMuscles:
+        """Return both bundles under imposed pressures (2, n) [Pa] and an angle [rad], taut."""
+
+        def force_of(p: Array, angle: Array, losses: tuple[Any, Any]) -> Array:
+            shape_a, shape_b, _, _ = self.geometry(angle)
+            x_a, x_b = self.coefficients(*p)
+            return self.pulley.torque(x_a * (shape_a - losses[0]), x_b * (shape_b - losses[1]))
+
+        def force(p: Array, angle: Array, state: Any) -> tuple[Array, Any]:
+            losses, after = self.slide(angle, p, state)
+            return force_of(p, angle, losses), after
+
+        return ImposedMuscles(
+            force, lambda p, angle: force_of(p, angle, (0.0, 0.0)), self.hysteresis.initial(cycles)
+        )
 
     # --- rows, files, identity --------------------------------------------------------------------
 

@@ -22,12 +22,20 @@ from pam_envs.plants.core.rows import signal_rows
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.bundles import N_WORK
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-from pam_envs.plants.elbow_orthosis.step import advance, begin_lane, replacements, start_hysteresis
+from pam_envs.plants.elbow_orthosis.step import (
+    advance,
+    begin_lane,
+    operators,
+    replacements,
+    start_hysteresis,
+)
 
-OUTPUTS = signal_rows(
-    K,
-    "angle velocity pressure_a pressure_b force_a force_b contraction_a contraction_b lag torque "
-    "stiffness felt wearer slack air_a air_b used switches",
+OUTPUTS = (
+    signal_rows(
+        K, "angle velocity pressure_a pressure_b force_a force_b contraction_a contraction_b"
+    )
+    | {"lag": K.LAG_A}
+    | signal_rows(K, "torque stiffness felt wearer slack air_a air_b used switches")
 )
 """Every signal of a record (SI) and its row of state."""
 MAKE = ("hysteresis.kind", "valves", "substeps")
@@ -81,7 +89,7 @@ def loop_of(plant: ElbowOrthosis, extended: bool = False, readings: bool = False
     kernels = {"plant_drive": drive, "plant_begin": begin, "advance": advance}
     return loop_for(
         f"elbow_{make[0]}_{make[1]}", plant, K, kernels, partial(replacements, *make),
-        OUTPUTS.values(), N_WORK, extended=extended,
+        OUTPUTS.values(), N_WORK, extended=extended, operators=operators(make[0]),
         readings=readings_of(plant) if readings else None,
     )  # fmt: skip
 

@@ -1,7 +1,8 @@
 """Row numbers of the elbow orthosis (see :mod:`pam_envs.plants.core.rows`).
 
 Of pairs, the first row is that of bundle a, which straightens the elbow. ``DRIVE``: torque of the
-intended motion; ``AT``: travel of the pulley, the hysteresis input; ``LEFT``, ``LIFT`` and
+intended motion; ``AT_A``: travel of the pulley, the hysteresis input (of both bundles, but for
+friction driven by length, where each has an operator of its own); ``LEFT``, ``LIFT`` and
 ``OPENED``: coil time left, lift and state of each valve.
 """
 
@@ -29,7 +30,8 @@ globals().update(
         each(
             "angle velocity pressure_a pressure_b command_a command_b intent intent_rate "
             "intent_acceleration disturbance force_a force_b contraction_a contraction_b torque "
-            "stiffness felt wearer slack air_a air_b used switches clock drive at lag"
+            "stiffness felt wearer slack air_a air_b used switches clock drive at_a at_b lag_a "
+            "lag_b"
         )
         | each("left lift opened", VALVES),
         dotted(
@@ -48,6 +50,7 @@ globals().update(
         each("effective crept factor", 2)
         | {"paths": 2 * PATH_STATE.end, "stuck": 1, "sensors": sensor_rows(3)},
         {"model": NUMBERS, "largest_lag": 1},
+        operators=2,
     )
 )
 

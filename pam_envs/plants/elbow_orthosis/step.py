@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.hysteresis import protocol
+from pam_envs.hysteresis.slip import LIMIT, STATE_ROWS
 from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.guide import turn
@@ -35,6 +36,7 @@ from pam_envs.plants.elbow_orthosis.bundles import (
     weight_of,
 )
 from pam_envs.plants.elbow_orthosis.effects import bundle_kernels
+from pam_envs.plants.elbow_orthosis.hysteresis import REFERENCE_PRESSURE
 
 SOFTEST = 0.1
 """Least stiffness [N m/rad] that a sub-step reckons with."""
@@ -45,7 +47,9 @@ begin_period: Any = None
 exchange_air: Any = None
 settle: Any = None
 start_air: Any = None
-MODEL_STATE = 0
+pulled: Any = None
+set_limits: Any = None
+MODEL_STATE, OPERATORS = 0, 1
 EFFECTIVE, SENSED_ANGLE, SENSED_PRESSURE = K.PRESSURE_A, K.ANGLE, K.PRESSURE_A
 """Rows of effective pressures and readings; those of the extended plant replace them."""
 
@@ -56,7 +60,57 @@ def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
-def pulled(
+def lag_of(rows: Any, j: int, side: int) -> float:
+    """Return the hysteresis lag [m] of the travel that a bundle has."""
+    return rows[K.LAG_A + side * (OPERATORS - 1)][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def pulled_by_length(
+    fixed: Any, j: int, side: int, angle: float, lag: float, pressure: float
+) -> tuple[float, float, float]:
+    """Return :func:`pulled` with friction of constant stiffness, whose limit has the pressure."""
+    shape, slope = shape_of(fixed, j, side, contraction_at(fixed, j, side, angle))
+    passive, pressed = factors_of(fixed, j, side)
+    factor = passive + pressed * pressure
+    stiff = passive + pressed * REFERENCE_PRESSURE
+    force = factor * shape - stiff * friction_of(fixed, j, side, lag)
+    tight = 1.0 if force > 0.0 else 0.0
+    return tight * force, tight * factor * slope, tight * pressed * shape
+
+
+@kernel
+def leave_limits(rows: Any, fixed: Any, hysteresis: int, first: int, last: int) -> None:
+    """Do nothing: the friction's stiffness depends on pressure, its limits do not."""
+
+
+@kernel
+def write_limits(rows: Any, fixed: Any, hysteresis: int, first: int, last: int) -> None:
+    """Write the limits of the friction of both bundles, in proportion to their stiffness."""
+    for side in range(2):
+        limit, pressure = rows[hysteresis + side * STATE_ROWS + LIMIT], rows[EFFECTIVE + side]
+        for j in range(first, last):
+            passive, pressed = factors_of(fixed, j, side)
+            limit[j] = (passive + pressed * pressure[j]) / (passive + pressed * REFERENCE_PRESSURE)
+
+
+@kernel
+def slide(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, first: int,
+    last: int,
+) -> None:  # fmt: skip
+    """Move the hysteresis of some lanes to their travels and write the lags."""
+    set_limits(rows, fixed, hysteresis, first, last)
+    for j in range(first, last):
+        rows[K.AT_A + 1][j] = rows[K.AT_A][j]
+    hysteresis_lag(
+        rows, fixed, counts, table, hysteresis, elements, K.AT_A, K.LAG_A, OPERATORS, K.MODEL,
+        K.STACK_COUNT, K.MEMBER, first, last,
+    )  # fmt: skip
+
+
+@kernel
+def pulled_at_pressure(
     fixed: Any, j: int, side: int, angle: float, lag: float, pressure: float
 ) -> tuple[float, float, float]:
     """Return the force of a bundle [N], and its growth with contraction [N/m] and pressure [m2].
@@ -103,11 +157,11 @@ def drive_of(rows: Any, fixed: Any, j: int) -> float:
 @kernel
 def middle_torque(rows: Any, fixed: Any, j: int, work: Any) -> tuple[float, float, float]:
     """Return the torque [N m] at the middle before and after, and minus its slope [N m/rad]."""
-    angle, lag, radius = work[MIDDLE][j], rows[K.LAG][j], fixed[K.PULLEY_RADIUS][j]
+    angle, radius = work[MIDDLE][j], fixed[K.PULLEY_RADIUS][j]
     old, slope = passive_torque(fixed, j, angle)
     new = old
     for side in range(2):
-        sign = 2.0 * side - 1.0
+        sign, lag = 2.0 * side - 1.0, lag_of(rows, j, side)
         was, soft, _ = pulled(fixed, j, side, angle, lag, work[WAS_A + side][j])
         now, hard, swell = pulled(fixed, j, side, angle, lag, work[NOW_A + side][j])
         old, new = old + sign * radius * was, new + sign * radius * now
@@ -154,20 +208,14 @@ def advance(
     for i in range(substeps):
         for j in range(LANES):
             work[MIDDLE][j] = rows[K.ANGLE][j] + 0.5 * h * rows[K.VELOCITY][j]
-            rows[K.AT][j] = travel_at(fixed, j, work[MIDDLE][j])
-        hysteresis_lag(
-            rows, fixed, counts, table, hysteresis, elements, K.AT, K.LAG, 1, K.MODEL,
-            K.STACK_COUNT, K.MEMBER, 0, LANES,
-        )  # fmt: skip
+            rows[K.AT_A][j] = travel_at(fixed, j, work[MIDDLE][j])
+        slide(rows, fixed, counts, table, hysteresis, elements, 0, LANES)
         exchange_air(rows, fixed, counts, i, substeps, period, work)
         swing(rows, fixed, i, substeps, h, work)
         settle(rows, fixed, work)
     for j in range(LANES):
-        rows[K.AT][j] = travel_at(fixed, j, rows[K.ANGLE][j])
-    hysteresis_lag(
-        rows, fixed, counts, table, hysteresis, elements, K.AT, K.LAG, 1, K.MODEL, K.STACK_COUNT,
-        K.MEMBER, 0, LANES,
-    )  # fmt: skip
+        rows[K.AT_A][j] = travel_at(fixed, j, rows[K.ANGLE][j])
+    slide(rows, fixed, counts, table, hysteresis, elements, 0, LANES)
     for j in range(LANES):
         report(rows, fixed, j)
         read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
@@ -180,7 +228,7 @@ def report(rows: Any, fixed: Any, j: int) -> None:
     torque, stiffness, slack = 0.0, 0.0, 0.0
     for side in range(2):
         effective = rows[EFFECTIVE + side][j]
-        force, growth, _ = pulled(fixed, j, side, angle, rows[K.LAG][j], effective)
+        force, growth, _ = pulled(fixed, j, side, angle, lag_of(rows, j, side), effective)
         rows[K.CONTRACTION_A + side][j] = contraction_at(fixed, j, side, angle)
         rows[K.FORCE_A + side][j] = force
         torque = torque + (2.0 * side - 1.0) * radius * force
@@ -218,9 +266,9 @@ def felt_torque(rows: Any, fixed: Any, j: int, torque: float) -> float:
 @kernel
 def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
     """Put the hysteresis of one lane into its virgin state."""
-    for k in range(MODEL_STATE):
+    for k in range(OPERATORS * MODEL_STATE):
         rows[hysteresis + k][j] = 0.0
-    counts[K.STACK_COUNT][j] = 1
+    counts[K.STACK_COUNT][j] = counts[K.STACK_COUNT + 1][j] = 1
 
 
 @kernel
@@ -229,7 +277,7 @@ def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
     torque, _ = passive_torque(fixed, j, angle)
     for side in range(2):
         effective = rows[EFFECTIVE + side][j]
-        force, _, _ = pulled(fixed, j, side, angle, rows[K.LAG][j], effective)
+        force, _, _ = pulled(fixed, j, side, angle, lag_of(rows, j, side), effective)
         torque = torque + (2.0 * side - 1.0) * fixed[K.PULLEY_RADIUS][j] * force
     return torque + rows[K.DRIVE][j] + rows[K.DISTURBANCE][j] - fixed[K.WEARER_STIFFNESS][j] * angle
 
@@ -247,17 +295,14 @@ def begin_lane(
     rows[K.PRESSURE_A][j], rows[K.PRESSURE_A + 1][j] = pressure_a, pressure_b
     begin_muscles(rows, fixed, j)
     rows[K.INTENT_RATE][j] = rows[K.INTENT_ACCELERATION][j] = 0.0
-    rows[K.VELOCITY][j] = rows[K.LAG][j] = rows[K.USED][j] = 0.0
+    rows[K.VELOCITY][j] = rows[K.LAG_A][j] = rows[K.USED][j] = 0.0
     rows[K.DRIVE][j] = drive_of(rows, fixed, j)
     low, high = fixed[K.PULLEY_LOWEST][j] - 0.5, fixed[K.PULLEY_HIGHEST][j] + 0.5
     for _ in range(54):
         angle = 0.5 * (low + high)
         start_hysteresis(rows, counts, hysteresis, j)
-        rows[K.AT][j] = travel_at(fixed, j, angle)
-        hysteresis_lag(
-            rows, fixed, counts, table, hysteresis, elements, K.AT, K.LAG, 1, K.MODEL,
-            K.STACK_COUNT, K.MEMBER, j, j + 1,
-        )  # fmt: skip
+        rows[K.AT_A][j] = travel_at(fixed, j, angle)
+        slide(rows, fixed, counts, table, hysteresis, elements, j, j + 1)
         if resting_torque(rows, fixed, j, angle) > 0.0:
             low = angle
         else:
@@ -288,11 +333,20 @@ def start_pulsed(rows: Any, fixed: Any, j: int) -> None:
         rows[K.LEFT + k][j] = 0.0
 
 
+def operators(kind: str) -> int:
+    """Return the number of hysteresis operators of a kind: one a bundle if driven by length."""
+    return 2 if protocol.model_of(kind).drive == "length" else 1
+
+
 STARTS = {"proportional": start_regulated, "on_off": start_pulsed}
 
 
 def replacements(kind: str, valves: str, effects: int | None = None) -> dict[str, Any]:
     """Return the kernels of a variant; ``effects``: first row of their state, None if plain."""
-    kernels = protocol.kernels(kind) | {"start_air": STARTS[valves]}
+    kernels = protocol.kernels(kind) | {"start_air": STARTS[valves], "OPERATORS": operators(kind)}
+    if operators(kind) == 2:
+        kernels |= {"pulled": pulled_by_length, "set_limits": write_limits}
+    else:
+        kernels |= {"pulled": pulled_at_pressure, "set_limits": leave_limits}
     extended = {} if effects is None else bundle_kernels(valves, effects)
     return kernels | AIR[valves] | extended

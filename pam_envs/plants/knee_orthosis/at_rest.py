@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from pam_envs.hysteresis.slip import SlipModel
 from pam_envs.plants.core.linearise import Array, Branch, Equilibrium, local_branch
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.pneumatics.measured_dynamics import modes
@@ -35,7 +37,8 @@ def at_rest(
     if not 0.0 < pressure < full:
         raise ValueError(f"pressure = {pressure:g} Pa; give one between 0 and {full:g} Pa")
     line = local_branch(plant.hysteresis.scaled, pressure, 0.0, branch, 1e-4 * full)
-    ratio = 1.0 if plant.hysteresis.operator else muscle.stiffness_ratio
+    by_length = plant.hysteresis.drive == "length"
+    ratio = muscle.stiffness_ratio if by_length or not plant.hysteresis.operator else 1.0
 
     def stiffness(p: Any) -> Array:
         return np.asarray(muscle.gain * ratio * line(p))
@@ -54,8 +57,10 @@ def at_rest(
     def tension_torque(state: Array) -> tuple[float, float]:
         theta = angle if rig else state[air]
         pull = float(muscle.tension(stiffness(share @ state[:air]), lever.length(theta)))
+        pull = max(0.0, pull + rub(float(lever.length(theta))))
         return pull, float(lever.torque(pull, theta))
 
+    rub = _friction(plant, float(lever.length(angle)), pressure, branch)
     rest = np.concatenate([pressure * settled, [] if rig else [angle, 0.0]])
     balance = tension_torque(rest)[1]
 
@@ -82,6 +87,19 @@ def at_rest(
         np.array([10.0] * air + ([] if rig else [1e-6, 1e-5]) + [10.0]),
         ((*lags, *moving), ("set_point",), ("tension", "torque", "pressure", *moving[:1])),
     )
+
+
+def _friction(
+    plant: KneeOrthosis, length: float, pressure: float, branch: Branch
+) -> Callable[[float], float]:
+    """Return the friction [N] driven by length [m] near a rest, reached by shortening."""
+    held, model = plant.hysteresis, plant.hysteresis.model
+    if not isinstance(model, SlipModel):
+        return lambda x: 0.0
+    limited = model.limited(float(held.limit(pressure)))
+    start = float(plant.lever.length(plant.lever.relaxed_angle))
+    line = local_branch(limited, length - start, 0.0, branch, 1e-6)
+    return lambda x: held.friction * float(x - start - line(x - start))
 
 
 def _regulator(plant: KneeOrthosis) -> tuple[Array, Array, Array]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE, GRAVITY
+from pam_envs.hysteresis.slip import LIMIT
 from pam_envs.kernels.arithmetic import decay, sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import damped_motion
@@ -29,6 +30,7 @@ from pam_envs.mechanics.leg import (
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.muscle.gas_spring import gas_volume, spring_tension, stretch_of
 from pam_envs.plants.knee_orthosis import rows as K
+from pam_envs.plants.knee_orthosis.hysteresis import REFERENCE_PRESSURE
 from pam_envs.references.gait import (
     ANKLE,
     COP,
@@ -152,19 +154,134 @@ WAS, HELD, HELD_RATE, KNEE_WAS, RATE_WAS, FORCE_WAS = range(6)
 N_WORK = 6
 
 
+# placeholders, filled in for each hysteresis and mounting
+hysteresis_lag: Any = None
+hysteresis_peek: Any = None
+feel_at: Any = None
+angle_ahead: Any = None
+EFFECTIVE = K.PRESSURE
+"""Row of the effective pressure; that of the extended plant replaces it."""
+
+
 @kernel
-def torque_and_slope(fixed: Any, j: int, angle: float, stiffness: float) -> tuple[float, float]:
+def set_length(rows: Any, fixed: Any, hysteresis: int, j: int, angle: float) -> None:
+    """Write the length of the muscle of one lane at an angle, and the limit of its friction."""
+    sine, _ = sine_and_cosine(0.5 * angle)
+    rows[K.AT][j] = muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
+    empty = fixed[K.HYSTERESIS_EMPTY][j]
+    grown = (1.0 - empty) * rows[EFFECTIVE][j] / REFERENCE_PRESSURE
+    rows[hysteresis + LIMIT][j] = max(0.0, empty + grown)
+
+
+@kernel
+def peek_length(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, first: int,
+    last: int,
+) -> None:  # fmt: skip
+    """Write lag and sticking share of the friction at the lengths written; it does not move."""
+    hysteresis_peek(
+        rows, fixed, counts, table, hysteresis, elements, K.AT, K.LAG, K.STICK, 1, K.MODEL,
+        K.STACK_COUNT, K.MEMBER, first, last,
+    )  # fmt: skip
+
+
+@kernel
+def move_length(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, first: int,
+    last: int,
+) -> None:  # fmt: skip
+    """Move the friction to the lengths written."""
+    hysteresis_lag(
+        rows, fixed, counts, table, hysteresis, elements, K.AT, K.LAG, 1, K.MODEL, K.STACK_COUNT,
+        K.MEMBER, first, last,
+    )  # fmt: skip
+
+
+@kernel
+def torque_and_slope(
+    rows: Any, fixed: Any, j: int, angle: float, stiffness: float
+) -> tuple[float, float]:
     """Return the assistive torque [N m] at an angle [rad] and its slope [N m/rad]."""
     sine, cosine = sine_and_cosine(0.5 * angle)
     arm, spring = fixed[K.LEVER_ARM][j], fixed[K.LEVER_STIFFNESS][j]
     stretch = stretch_of(
         muscle_length(sine, arm, fixed[K.LEVER_FITTINGS][j]), fixed[K.MUSCLE_SHORTEST_LENGTH][j]
     )
-    tension = spring_tension(stiffness, stretch)
+    rub = rows[K.RUB][j]
+    tension = max(0.0, spring_tension(stiffness, stretch) + rub * rows[K.LAG][j])
     torque = assistive_torque(tension, cosine, angle, arm, spring, fixed[K.LEVER_RELAXED_ANGLE][j])
     pulls = max(0.0, stiffness) if stretch > 0.0 else 0.0
+    pulls = pulls + rub * rows[K.STICK][j]
     lever = arm * cosine
     return torque, spring + pulls * lever * lever - 0.5 * tension * arm * sine
+
+
+@kernel
+def feel_nothing(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int,
+    angle: float,
+) -> None:  # fmt: skip
+    """Do nothing: the pressure has the hysteresis."""
+
+
+@kernel
+def feel_length(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int,
+    angle: float,
+) -> None:  # fmt: skip
+    """Write the friction of one lane at an angle; it does not move."""
+    set_length(rows, fixed, hysteresis, j, angle)
+    peek_length(rows, fixed, counts, table, hysteresis, elements, j, j + 1)
+
+
+@kernel
+def slide_nothing(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, ahead: float,
+    work: Any,
+) -> None:  # fmt: skip
+    """Do nothing: the pressure has the hysteresis."""
+
+
+@kernel
+def feel_ahead(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, ahead: float,
+    work: Any,
+) -> None:  # fmt: skip
+    """Write the friction of a tile at the angles ``ahead`` seconds from now; it does not move."""
+    for j in range(LANES):
+        set_length(rows, fixed, hysteresis, j, angle_ahead(rows, fixed, j, ahead, work))
+    peek_length(rows, fixed, counts, table, hysteresis, elements, 0, LANES)
+
+
+@kernel
+def slide_ahead(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, ahead: float,
+    work: Any,
+) -> None:  # fmt: skip
+    """Move the friction of a tile to the angles ``ahead`` seconds from now."""
+    for j in range(LANES):
+        set_length(rows, fixed, hysteresis, j, angle_ahead(rows, fixed, j, ahead, work))
+    move_length(rows, fixed, counts, table, hysteresis, elements, 0, LANES)
+
+
+@kernel
+def brace_ahead(rows: Any, fixed: Any, j: int, ahead: float, work: Any) -> float:
+    """Return the predicted angle [rad] of a brace without a leg."""
+    return rows[K.ANGLE][j] + ahead * rows[K.VELOCITY][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def leg_ahead(rows: Any, fixed: Any, j: int, ahead: float, work: Any) -> float:
+    """Return the predicted angle [rad] of a brace on a leg."""
+    path = fixed[K.LEVER_MOUNT_ANGLE][j] + work[KNEE_WAS][j] + ahead * work[RATE_WAS][j]
+    return path + rows[K.DEVIATION][j] + ahead * rows[K.DEVIATION_RATE][j]  # type: ignore[no-any-return]
+
+
+def friction_kernels(by_length: bool) -> dict[str, Any]:
+    """Return the kernels of the friction by their placeholders."""
+    if not by_length:
+        return {"feel": slide_nothing, "slide": slide_nothing, "feel_at": feel_nothing}
+    return {"feel": feel_ahead, "slide": slide_ahead, "feel_at": feel_length}
 
 
 @kernel
@@ -191,8 +308,8 @@ def swing_free(
         ahead = 0.5 * h * velocity[j]
         per_inertia = 1.0 / fixed[K.LEVER_INERTIA][j]
         drag = fixed[K.LEVER_DAMPING][j] * per_inertia
-        old, slope_old = torque_and_slope(fixed, j, angle[j] + ahead, was[j])
-        new, slope_new = torque_and_slope(fixed, j, angle[j] + ahead, stiffness[j])
+        old, slope_old = torque_and_slope(rows, fixed, j, angle[j] + ahead, was[j])
+        new, slope_new = torque_and_slope(rows, fixed, j, angle[j] + ahead, stiffness[j])
         slope = max(1.0, 0.5 * (slope_old + slope_new))
         du, velocity[j] = turn(
             rows, fixed, j, velocity[j], (slope * ahead - old) * per_inertia,
@@ -244,8 +361,8 @@ def follow_leg(
         )
         drag = (held_rate[j] + fixed[K.LEVER_DAMPING][j]) * per_inertia
         middle = mount[j] + off[j] + ahead
-        old, slope_old = torque_and_slope(fixed, j, middle + work[KNEE_WAS][j], was[j])
-        new, slope_new = torque_and_slope(fixed, j, middle + knee, stiffness[j])
+        old, slope_old = torque_and_slope(rows, fixed, j, middle + work[KNEE_WAS][j], was[j])
+        new, slope_new = torque_and_slope(rows, fixed, j, middle + knee, stiffness[j])
         old = old + along_path(fixed, j, work[RATE_WAS][j], work[FORCE_WAS][j])
         old = old - habituated(fixed, j, work[KNEE_WAS][j])
         new = new + along_path(fixed, j, turn, bend) - habituated(fixed, j, knee)
@@ -281,7 +398,8 @@ def report_muscle(rows: Any, fixed: Any, j: int, length: float) -> None:
     """Write length, tension and air of one lane."""
     stretch = stretch_of(length, fixed[K.MUSCLE_SHORTEST_LENGTH][j])
     rows[K.LENGTH][j] = length
-    rows[K.TENSION][j] = spring_tension(rows[K.STIFFNESS][j], stretch)
+    rub = rows[K.RUB][j] * rows[K.LAG][j]
+    rows[K.TENSION][j] = max(0.0, spring_tension(rows[K.STIFFNESS][j], stretch) + rub)
     space = gas_volume(
         length,
         fixed[K.MUSCLE_SHORTEST_LENGTH][j],
@@ -298,14 +416,14 @@ def report_alone(rows: Any, fixed: Any, j: int, period: float) -> None:
     report_muscle(
         rows, fixed, j, muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
     )
-    rows[K.TORQUE][j], _ = torque_and_slope(fixed, j, rows[K.ANGLE][j], rows[K.STIFFNESS][j])
+    rows[K.TORQUE][j], _ = torque_and_slope(rows, fixed, j, rows[K.ANGLE][j], rows[K.STIFFNESS][j])
 
 
 @kernel
 def report_rig(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Write the signals of a muscle held at its length."""
     report_muscle(rows, fixed, j, fixed[K.FIXTURE_LENGTH][j])
-    rows[K.TORQUE][j], _ = torque_and_slope(fixed, j, rows[K.ANGLE][j], rows[K.STIFFNESS][j])
+    rows[K.TORQUE][j], _ = torque_and_slope(rows, fixed, j, rows[K.ANGLE][j], rows[K.STIFFNESS][j])
 
 
 @kernel
@@ -334,7 +452,10 @@ def delivered(rows: Any, fixed: Any, j: int, torque: float) -> float:
 
 
 @routine
-def rest_rig(rows: Any, fixed: Any, gait: Any, j: int) -> None:
+def rest_rig(
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
+    j: int,
+) -> None:  # fmt: skip
     """Put the muscle at its length in the rig."""
     low, high = 0.0, 3.141592653589793
     for _ in range(60):
@@ -351,12 +472,16 @@ def rest_rig(rows: Any, fixed: Any, gait: Any, j: int) -> None:
 
 
 @routine
-def rest_alone(rows: Any, fixed: Any, gait: Any, j: int) -> None:
+def rest_alone(
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
+    j: int,
+) -> None:  # fmt: skip
     """Put the brace where spring and muscle balance."""
     low, high = 0.0, 3.141592653589793
     for _ in range(60):
         angle = 0.5 * (low + high)
-        torque, _ = torque_and_slope(fixed, j, angle, rows[K.STIFFNESS][j])
+        feel_at(rows, fixed, counts, table, hysteresis, elements, j, angle)
+        torque, _ = torque_and_slope(rows, fixed, j, angle, rows[K.STIFFNESS][j])
         if torque < 0.0:
             low = angle
         else:
@@ -365,7 +490,10 @@ def rest_alone(rows: Any, fixed: Any, gait: Any, j: int) -> None:
 
 
 @routine
-def rest_leg(rows: Any, fixed: Any, gait: Any, j: int) -> None:
+def rest_leg(
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
+    j: int,
+) -> None:  # fmt: skip
     """Put the knee where the wearer's hold balances the brace, moving along the path."""
     gait_at(rows, fixed, gait, j, fraction_of_turn(rows[K.START_PHASE][j]))
     load = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
@@ -374,7 +502,8 @@ def rest_leg(rows: Any, fixed: Any, gait: Any, j: int) -> None:
     low, high = -1.0, 1.0
     for _ in range(60):
         off = 0.5 * (low + high)
-        torque, _ = torque_and_slope(fixed, j, angle + off, rows[K.STIFFNESS][j])
+        feel_at(rows, fixed, counts, table, hysteresis, elements, j, angle + off)
+        torque, _ = torque_and_slope(rows, fixed, j, angle + off, rows[K.STIFFNESS][j])
         if torque + load + rows[K.HOLD][j] * off < 0.0:
             low = off
         else:
@@ -388,18 +517,21 @@ MOTIONS: dict[str, dict[str, Any]] = {
         "begin_period": begin_period_alone,
         "move": stay,
         "rest": rest_rig,
+        "angle_ahead": brace_ahead,
         "report": report_rig,
     },
     "no_load": {
         "begin_period": begin_period_alone,
         "move": swing_free,
         "rest": rest_alone,
+        "angle_ahead": brace_ahead,
         "report": report_alone,
     },
     "leg": {
         "begin_period": begin_period_leg,
         "move": follow_leg,
         "rest": rest_leg,
+        "angle_ahead": leg_ahead,
         "report": report_leg,
     },
 }

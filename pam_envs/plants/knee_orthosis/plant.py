@@ -24,15 +24,17 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.protocol import Usage
+from pam_envs.hysteresis.protocol import Usage, operator_of
+from pam_envs.hysteresis.slip import SlipModel
 from pam_envs.mechanics.knee_lever import KneeLever
 from pam_envs.mechanics.leg import Leg
 from pam_envs.muscle.emg import MuscleActivation
 from pam_envs.muscle.gas_spring import GasSpring
 from pam_envs.parameters import published
+from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.hysteresis import KneeHysteresis, knee_hysteresis
+from pam_envs.plants.knee_orthosis.hysteresis import LENGTHS, KneeHysteresis, knee_hysteresis
 from pam_envs.pneumatics.measured_dynamics import OrthosisRegulator, mode_rows
 from pam_envs.references.gait import ACTIVITIES, PAPER_STRIDE, SIGNALS, gait_table
 from pam_envs.sensing.sensor import (
@@ -46,6 +48,7 @@ from pam_envs.sensing.sensor import (
 from pam_envs.sensing.shoe import Shoe
 
 Mounting = Literal["rig", "no_load", "leg"]
+Array = NDArray[np.float64]
 Dynamics = Literal["lag", "measured"]
 Activity = Literal["walk", "stairs_up", "stairs_down"]
 
@@ -229,6 +232,29 @@ class KneeOrthosis(Plant, rows=K):
             opens = self.lever.torque(tension, middle) < 0.0
             low, high = np.where(opens, middle, low), np.where(opens, high, middle)
         return 0.5 * (low + high)
+
+    def imposed_muscles(self, cycles: int) -> ImposedMuscles:
+        """Return the muscle under an imposed pressure and length [m], never slack."""
+        held, muscle = self.hysteresis, self.muscle
+        operator, model = held.scaled, held.model
+        state = operator_of(operator).initial_state((cycles,))
+        if isinstance(model, SlipModel):
+            state = model.initial_state((cycles,))
+        middle = float(np.mean(LENGTHS))
+
+        def force(p: Array, length: Array, state: Any) -> tuple[Array, Any]:
+            if isinstance(model, SlipModel):
+                lag, after = model.lag(length - middle, state, held.limit(p[0]))
+                return law(p, length) - held.friction * lag, after
+            if operator is None:
+                return law(p, length), state
+            felt, after = operator.step(p[0], state)
+            return -muscle.tension(muscle.gain * felt, length), after
+
+        def law(p: Array, length: Array) -> Array:
+            return -muscle.tension(muscle.gain * muscle.stiffness_ratio * p[0], length)
+
+        return ImposedMuscles(force, law, state)
 
     # --- rows, files, identity --------------------------------------------------------------------
 

@@ -21,12 +21,12 @@ globals().update(
             "angle velocity pressure stiffness set_point old_set_point tension length torque air "
             "old_pressure old_air start_phase phase knee knee_rate knee_acceleration deviation "
             "deviation_rate shank ankle ground_z ground_x cop demand estimate heel stance hold "
-            "hold_rate quads quads_free flexors flexors_free"
+            "hold_rate quads quads_free flexors flexors_free at lag stick rub"
         )
         | {"mode": MODES},
         dotted(
             regulator="max_pressure time_constant slew_rate",
-            hysteresis="width",
+            hysteresis="width friction empty",
             muscle="shortest_length stiffness_ratio full_volume gain",
             lever="arm fittings stiffness relaxed_angle mount_angle inertia damping",
             fixture="length",

@@ -17,7 +17,12 @@ from pam_envs.plants.core.muscle_path import regulated
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.effects import muscle_kernels
-from pam_envs.plants.knee_orthosis.motion import MOTIONS, WAS
+from pam_envs.plants.knee_orthosis.motion import (
+    MOTIONS,
+    WAS,
+    friction_kernels,
+    move_length,
+)
 from pam_envs.pneumatics.measured_dynamics import MODES, REAL_MODES, pair_factor, turned
 
 PAIR = K.MODE_TABLE + 2 * REAL_MODES
@@ -30,6 +35,10 @@ regulate: Any = None
 settle: Any = None
 begin_period: Any = None
 move: Any = None
+feel: Any = None
+slide: Any = None
+start_friction: Any = None
+settle_friction: Any = None
 rest: Any = None
 report: Any = None
 SENSED = (K.TENSION, K.ANGLE, K.PRESSURE, K.HEEL, K.GROUND_Z, K.COP, K.ANKLE)
@@ -67,10 +76,54 @@ def stiffness_of_model(
 
 def hysteresis_kernels(kind: str) -> dict[str, Any]:
     """Return the kernels of a kind by the plant's placeholders."""
-    identity = protocol.model_of(kind).identity
-    return protocol.kernels(kind) | {
-        "write_stiffness": stiffness_of_line if identity else stiffness_of_model
-    }
+    model = protocol.model_of(kind)
+    by_length = model.drive == "length"
+    plain = model.identity or by_length
+    return (
+        protocol.kernels(kind)
+        | friction_kernels(by_length)
+        | {
+            "write_stiffness": stiffness_of_line if plain else stiffness_of_model,
+            "start_friction": start_free if by_length else start_without,
+            "settle_friction": settle_length if by_length else settle_without,
+        }
+    )
+
+
+@kernel
+def start_without(
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
+    j: int,
+) -> None:  # fmt: skip
+    """Do nothing: the pressure has the hysteresis."""
+
+
+@kernel
+def start_free(
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
+    j: int,
+) -> None:  # fmt: skip
+    """Put the sliders of one lane at the length of rest without pressure, free of force."""
+    rows[K.RUB][j] = 0.0
+    rest(rows, fixed, counts, table, gait, hysteresis, elements, j)
+    rows[K.RUB][j] = fixed[K.HYSTERESIS_FRICTION][j]
+    for k in range(elements):
+        rows[hysteresis + k][j] = rows[K.AT][j]
+
+
+@kernel
+def settle_without(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
+) -> None:
+    """Do nothing: the pressure has the hysteresis."""
+
+
+@kernel
+def settle_length(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
+) -> None:
+    """Move the friction of one lane to the length at which it came to rest."""
+    move_length(rows, fixed, counts, table, hysteresis, elements, j, j + 1)
 
 
 @kernel
@@ -137,7 +190,9 @@ def advance(
         for j in range(LANES):
             work[WAS][j] = rows[K.STIFFNESS][j]
         write_stiffness(rows, fixed, counts, table, hysteresis, 0, LANES, elements)
+        feel(rows, fixed, counts, table, hysteresis, elements, 0.5 * h, work)
         move(rows, fixed, counts, gait, i, substeps, h, work)
+        slide(rows, fixed, counts, table, hysteresis, elements, 0.0, work)
     for j in range(LANES):
         report(rows, fixed, j, period)
         read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
@@ -158,13 +213,15 @@ def begin_lane(
     rows[K.PRESSURE][j] = 0.0
     begin_muscle(rows, fixed, j)
     write_stiffness(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
+    rows[K.START_PHASE][j] = start_phase
+    start_friction(rows, fixed, counts, table, gait, hysteresis, elements, j)
     rows[K.PRESSURE][j] = pressure
     begin_muscle(rows, fixed, j)
     write_stiffness(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
     settle(rows, fixed, j)
     rows[K.SET_POINT][j] = rows[K.OLD_SET_POINT][j] = rows[K.OLD_PRESSURE][j] = pressure
-    rows[K.START_PHASE][j] = start_phase
-    rest(rows, fixed, gait, j)
+    rest(rows, fixed, counts, table, gait, hysteresis, elements, j)
+    settle_friction(rows, fixed, counts, table, hysteresis, elements, j)
     report(rows, fixed, j, 0.0)
     read_sensors(rows, fixed, j, 0, 0.0)
     rows[K.OLD_AIR][j] = rows[K.AIR][j]

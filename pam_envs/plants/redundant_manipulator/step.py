@@ -38,7 +38,6 @@ from pam_envs.plants.antagonistic_joint.pair import (
     begin_muscles,
     command,
     contract,
-    friction_of,
     lag_of,
     lever_of,
     peek_at,
@@ -58,7 +57,9 @@ of each muscle."""
 RESTING = 30
 """Steps to the pose at rest."""
 
-MODEL_STATE = 0  # placeholder: rows of state of a hysteresis model
+# placeholders: rows of state of a hysteresis model, and its friction
+MODEL_STATE = 0
+friction_of: Any = None
 SENSED_ANGLE, SENSED_PRESSURE = M.ANGLE, M.PRESSURE
 """Rows of readings; those of the extended plant replace them."""
 

@@ -25,7 +25,7 @@ def at_rest(
     if not 0.0 < pressure < full:
         raise ValueError(f"pressure = {pressure:g} Pa; give one between 0 and {full:g} Pa")
     point = float(law.stretched(pressure, full))
-    line = local_branch(law.at_load(mass), point, 0.0, branch, 1e-4 * full)
+    line = local_branch(plant.operator_at(mass), point, 0.0, branch, 1e-4 * full)
     offset = float(plant._absolute(np.zeros(()), np.asarray(mass)))
     inertia = mass + plant.mass.moving_mass
 

@@ -39,8 +39,8 @@ from pam_envs.muscle.effects import (
 )
 from pam_envs.plants.core.sensors import effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.rows import STATE as S
-from pam_envs.plants.single_muscle.step import hysteresis_kernels
 from pam_envs.pneumatics.regulator import (
     air_step,
     begin_air,
@@ -51,7 +51,10 @@ from pam_envs.pneumatics.regulator import (
 )
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
-plain_hysteresis: Any = None  # placeholder: one of the three hysteresis models
+# placeholders, see hysteresis_kernels
+plain_hysteresis: Any = None
+hysteresis_ahead: Any = None
+hysteresis_moved: Any = None
 
 FULL_STRAIN = 0.15
 """Full scale of the position sensor, over the rest length."""
@@ -186,6 +189,22 @@ def rest_extended(fixed: Any, lane: int, drive: float, load: float) -> float:
 
 
 @kernel
+def excess_pull(rows: Any, fixed: Any, j: int, e: float) -> float:
+    """Return the force [N] of one lane at a strain beyond what hangs of the load."""
+    x, drive = e * fixed[R.MUSCLE_REST_LENGTH][j], rows[R.DRIVE][j]
+    _, weight, stiffer, shift = carried(fixed, j, rows[R.LOAD][j])
+    pull, _ = law_of(fixed, j, drive - shift, drive - shift, e, stiffer)
+    hangs = load_fraction(x, rows[EFFECTS_AT + S.hangs][j], fixed[R.MASS_SLACK][j])
+    return pull - weight * hangs
+
+
+@kernel
+def hang_load(rows: Any, fixed: Any, j: int) -> None:
+    """Write the position at which the load of one lane hangs freely without pressure."""
+    rows[EFFECTS_AT + S.hangs][j] = balance(fixed, j, 0.0, rows[R.LOAD][j], NO_SUPPORT)
+
+
+@kernel
 def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     """Begin the effects of lane ``j`` at rest at its position and pressure."""
     x = rows[R.CONTRACTION][j]
@@ -263,7 +282,9 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
         e = (x[j] + ahead) * per_length
         middle = 0.5 * (was[j] + drive[j]) - shift
         pull, slope = law_of(fixed, j, was[j] - shift, middle, e, stiffer)
+        rub = fixed[R.HYSTERESIS_FRICTION][j]
         pull, slope = pull - friction[j], slope + sticking[j]
+        pull, slope = pull - rub * rows[R.LAG][j], slope + rub * rows[R.STICK][j]
         slack = fixed[R.MASS_SLACK][j]
         hangs = load_fraction(x[j] + ahead, rows[EFFECTS_AT + S.hangs][j], slack)
         eased = weight * fixed[R.MUSCLE_REST_LENGTH][j] / max(slack, 1e-6)
@@ -285,13 +306,14 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
 
 @kernel
 def move(
-    rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, sticks: int, mounts: int,
-    stretches: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, was: Any,
+    h: float, own: Any, strands: int, sticks: int, mounts: int, stretches: int,
 ) -> None:  # fmt: skip
     """Move the load of a tile for ``h`` seconds, the effective pressure going from ``was``."""
     x, v, stuck = rows[R.CONTRACTION], rows[R.VELOCITY], rows[EFFECTS_AT + S.stuck]
     before, width = own[0], own[1]
     springs, pushes, jerks, drags, lightness = own[3], own[4], own[5], own[6], own[7]
+    hysteresis_ahead(rows, fixed, counts, table, hysteresis, 0, LANES, elements, 0.5 * h)
     forces(rows, fixed, was, h, own, strands)
     if sticks > 0:
         for j in range(LANES):
@@ -307,6 +329,7 @@ def move(
             a = pushes[j] + 0.5 * k * h * v[j]
             dx, v[j] = damped_motion(v[j], a, jerks[j], k, drag, decay(0.5 * drag * h), h)
             x[j] = x[j] + dx
+    hysteresis_moved(rows, fixed, counts, table, hysteresis, 0, LANES, elements, 0.0)
     if strands > 0:
         for j in range(LANES):
             width[j] = x[j] / fixed[R.MUSCLE_REST_LENGTH][j]
@@ -397,7 +420,10 @@ def advance_extended(
         for q in range(parts):
             for j in range(LANES):
                 drive[j] = was[j] + (own[2][j] - was[j]) / (parts - q)
-            move(rows, fixed, was, h / parts, own, strands, sticks, mounts, stretches)
+            move(
+                rows, fixed, counts, table, hysteresis, elements, was, h / parts, own, strands,
+                sticks, mounts, stretches,
+            )  # fmt: skip
             for j in range(LANES):
                 was[j] = drive[j]
     for j in range(LANES):
@@ -415,6 +441,8 @@ def replacements(kind: str, first: int) -> dict[str, Any]:
         "write_drive": settled,
         "advance": advance_extended,
         "rest_contraction": rest_extended,
+        "excess_pull": excess_pull,
+        "hang_load": hang_load,
         "begin_effects": begin_effects,
         "true_position": true_position,
         "seen_position": seen_position,

@@ -1,4 +1,4 @@
-"""Hysteresis of the single muscle, from its pressure to its effective pressure."""
+"""Hysteresis of the single muscle: friction driven by length, or of its effective pressure."""
 
 from __future__ import annotations
 
@@ -20,14 +20,23 @@ from pam_envs.plants.core.plant import OperatorComponent
 
 Kind: TypeAlias = str
 """A value of ``hysteresis=``, one of :func:`pam_envs.hysteresis.protocol.kinds`."""
+_FIT = "least squares on positioning2021, Tables 3-5"
 
 
 @dataclass(frozen=True)
 class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, OperatorComponent):
-    """Pressure-driven friction of braid and tube.
+    """Friction of braid and tube, driven by length or by pressure.
 
-    The pressure, stretched to a scale on which friction is uniform, passes an operator with
-    hysteresis; the operator's hysteretic part is scaled by ``1 + width_per_load * load``; the
+    *Length* (an operator of :mod:`pam_envs.hysteresis.slip`): the force of friction elements in
+    parallel with the muscle, which their strain drives from that under the load at no pressure,
+
+        F = F(p, e) - friction lag(e),    limit = 1 + limit_per_pressure p + limit_per_load load
+
+    with stiffnesses that are constant and slip forces that the ``limit`` scales: passive whatever
+    pressure and length do.
+
+    *Pressure*: the pressure, stretched to a scale on which friction is uniform, passes an operator
+    with hysteresis; the operator's hysteretic part is scaled by ``1 + width_per_load * load``; the
     result is stretched back. ``operator`` has slope 1 and starts virgin, or is None.
     """
 
@@ -37,6 +46,7 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, Operator
         ("pressure_bend",),
         ("first_width", "first_loss", "first_travel"),
         ("threshold",),
+        ("friction", "limit_per_pressure", "limit_per_load"),
     )
 
     stretch: float = identified(
@@ -44,7 +54,7 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, Operator
         "1",
         -0.8,
         0.8,
-        "pressure-dependent friction; least squares on positioning2021, Tables 3-5",
+        f"pressure-dependent friction; {_FIT}",
         neutral=0.0,
     )
     width_per_load: float = identified(
@@ -52,8 +62,17 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, Operator
         "1/kg",
         -0.2,
         0.2,
-        "load-dependent loop width; least squares on positioning2021, Tables 3-5",
+        f"load-dependent loop width; {_FIT}",
         neutral=0.0,
+    )
+    friction: float = identified(
+        0.0, "N", 0.0, 1e5, f"stiffness of all elements over strain; {_FIT}", neutral=0.0
+    )
+    limit_per_pressure: float = identified(
+        0.0, "1/Pa", -1e-6, 1e-4, f"slip force over that at no pressure; {_FIT}", neutral=0.0
+    )
+    limit_per_load: float = identified(
+        0.0, "1/kg", -0.2, 1.0, f"slip force over that without load; {_FIT}", neutral=0.0
     )
     # an effect of the first cycles that only this hysteresis has
     first_width: float = effect("1", -1.0, 10.0, "extra loop width of the first travel")
@@ -69,16 +88,17 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, Operator
         root = np.sqrt(np.maximum(0.0, s * s - 4.0 * self.stretch * z / full))
         return np.asarray(2.0 * z / (s + root))
 
+    def limit(self, pressure: ArrayLike, load: ArrayLike) -> NDArray[np.float64]:
+        """Return the factor on the slip forces at a pressure [Pa] and a load [kg]."""
+        grown = self.limit_per_pressure * np.asarray(pressure, float)
+        return np.asarray(np.maximum(0.0, 1.0 + grown + self.limit_per_load * np.asarray(load)))
+
     def at_load(self, load: float) -> HysteresisModel | None:
         """Return the operator at a load [kg], with its hysteretic part scaled."""
         if self.operator is None:
             return None
         width = max(0.0, min(1.2, 1.0 + self.width_per_load * load))
         return self.operator.scaled(width, slope=1.0)
-
-    def inverse(self, load: float, full: float) -> HysteresisInverse:
-        """Return the exact inverse at a load [kg] for pressures from 0 to ``full`` [Pa]."""
-        return HysteresisInverse(self, self.at_load(load), full)
 
 
 @dataclass(frozen=True)

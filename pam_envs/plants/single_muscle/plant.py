@@ -20,12 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.protocol import Usage, model_of, preset
+from pam_envs.hysteresis.protocol import HysteresisModel, Usage, model_of, operator_of, preset
+from pam_envs.hysteresis.slip import SlipModel
 from pam_envs.mechanics.hanging_mass import HangingMass
 from pam_envs.muscle.effective_area import EffectiveAreaMuscle
+from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.hysteresis import Hysteresis
+from pam_envs.plants.single_muscle.friction import LoadedFriction
+from pam_envs.plants.single_muscle.hysteresis import Hysteresis, HysteresisInverse
 from pam_envs.pneumatics.regulator import Regulator
 from pam_envs.sensing.sensor import PositionSensor, PressureSensor
 
@@ -88,7 +91,8 @@ class SingleMuscle(Plant, rows=R):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Hysteresis model; each was identified on the same data.
+            Hysteresis model; each was identified on the same data. Driven by length, and so
+            passive: ``"maxwell_slip_length"`` and ``"preisach_length"``.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``mass__load=4.55``).
         """
@@ -147,6 +151,42 @@ class SingleMuscle(Plant, rows=R):
         weight, stiffer, shift = self._carried(load)
         pull = weight + (stiffer - 1.0) * self.muscle.passive(strain)
         return self.muscle.drive(pull, strain) + shift
+
+    def operator_at(self, load: float) -> HysteresisModel | None:
+        """Return the hysteresis at a load [kg], from (stretched) pressure to effective pressure.
+
+        ``None`` without hysteresis. Friction driven by length is seen at rest
+        (:class:`~pam_envs.plants.single_muscle.friction.LoadedFriction`).
+        """
+        if self.hysteresis.drive == "length":
+            return LoadedFriction(self, load)
+        return self.hysteresis.at_load(load)
+
+    def hysteresis_inverse(self, load: float) -> HysteresisInverse:
+        """Return the exact inverse of the hysteresis at a load [kg]."""
+        full = self.regulator.max_pressure
+        return HysteresisInverse(self.hysteresis, self.operator_at(load), full)
+
+    def imposed_muscles(self, cycles: int) -> ImposedMuscles:
+        """Return the muscle under an imposed pressure and contraction [m], with the plant's load.
+
+        Friction driven by length begins free of force at contraction 0.
+        """
+        held, length, full = self.hysteresis, self.muscle.rest_length, self.regulator.max_pressure
+        model, load = held.model, self.mass.load
+        operator = model if isinstance(model, SlipModel) else operator_of(held.at_load(load))
+
+        def force(p: NDArray[Any], x: NDArray[Any], state: Any) -> tuple[NDArray[Any], Any]:
+            if isinstance(operator, SlipModel):
+                lag, after = operator.lag(x / length, state, held.limit(p[0], load))
+                return self.muscle.tension(p[0], x / length) - held.friction * lag, after
+            felt, after = operator.step(held.stretched(p[0], full), state)
+            return self.muscle.tension(held.unstretched(felt, full), x / length), after
+
+        def law(p: NDArray[Any], x: NDArray[Any]) -> NDArray[Any]:
+            return self.muscle.tension(p[0], x / length)
+
+        return ImposedMuscles(force, law, operator.initial_state((cycles,)))
 
     # --- rows, files, identity ----------------------------------------------------------------
 

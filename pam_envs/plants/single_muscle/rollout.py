@@ -23,12 +23,14 @@ from pam_envs.plants.single_muscle.effects import (
     rest_extended,
     settled,
 )
+from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.step import (
     N_WORK,
     advance,
-    hysteresis_kernels,
+    begin_rest,
     rest_contraction,
+    slide_to_rest,
     true_position,
 )
 
@@ -62,8 +64,8 @@ def begin(
     """Begin a tile at rest at no pressure."""
     for j in range(LANES):
         rows[R.REST][j] = rest_contraction(fixed, j, 0.0, rows[R.LOAD][j])
-        rows[R.CONTRACTION][j] = rows[R.REST][j]
         counts[R.STACK_COUNT][j] = 1
+        begin_rest(rows, fixed, counts, table, R.END, elements, j)
 
 
 @kernel
@@ -82,12 +84,13 @@ def begin_extended(
     for j in range(LANES):
         counts[R.STACK_COUNT][j] = 1
         rows[R.REST][j] = rest_extended(fixed, j, 0.0, rows[R.LOAD][j])
+        begin_rest(rows, fixed, counts, table, R.END, elements, j)
     settled(rows, fixed, counts, table, R.END, 0, LANES, elements, work)
     for j in range(LANES):
         rows[R.PRESSURE][j] = drives[START_PRESSURE][t][min(first + j, last)]
     settled(rows, fixed, counts, table, R.END, 0, LANES, elements, work)
     for j in range(LANES):
-        rows[R.CONTRACTION][j] = rest_extended(fixed, j, rows[R.DRIVE][j], rows[R.LOAD][j])
+        slide_to_rest(rows, fixed, counts, table, R.END, elements, j)
         begin_effects(rows, fixed, j)
         for k in range(N_HISTORY):
             rows[R.HISTORY + k][j] = drives[HELD][t][min(first + j, last)]

@@ -1,7 +1,8 @@
 """Row numbers of the single muscle (see :mod:`pam_envs.plants.core.rows`).
 
-``REST`` to ``CHANGE`` are drawn at reset; ``HISTORY`` is the ring of the last setpoints; ``TALL``
-and ``COSINE`` are derived from the muscle's diameter and braid angle.
+``REST`` to ``CHANGE`` are drawn at reset; ``STRAIN`` to ``STICK`` belong to friction driven by
+length; ``HISTORY`` is the ring of the last setpoints; ``TALL`` and ``COSINE`` are derived from the
+muscle's diameter and braid angle.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def _names(part: str, members: tuple[Any, ...]) -> tuple[str, ...]:
 _ROWS = layout(
     each(
         "contraction velocity pressure drive set_point old_set_point load old_pressure old_air "
-        "rest declared_load change_time change"
+        "rest declared_load change_time change strain lag stick"
     )
     | {"history": N_HISTORY},
     dotted(
@@ -64,7 +65,7 @@ _ROWS = layout(
         mass="load moving_mass damping",
         position="noise resolution bias",
         pressure="noise resolution bias",
-        hysteresis="stretch width_per_load",
+        hysteresis="stretch width_per_load friction limit_per_pressure limit_per_load",
     ),
     {part: _names(part, members) for part, members in _EFFECTS.items()},
     {

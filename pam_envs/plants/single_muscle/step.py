@@ -1,20 +1,18 @@
 """One control period of the single muscle, for one environment or a tile of them.
 
-The sub-step: the regulator's pressure is exact at its end; the hysteresis, which depends only on
-the pressures passed through, is then exact too, because within a sub-step the pressure is monotone;
-the motion is exact for the force linearised about the predicted mid-point with the effective
-pressure going straight from its old to its new value. So the step is of second order and has no
-stability limit from the stiffness of a light load. The effective pressure is that of a hysteresis
-model between two scales of the pressure.
+The sub-step: the regulator's pressure is exact at its end; a hysteresis driven by pressure is then
+exact too, because within a sub-step the pressure is monotone, and friction driven by length is
+evaluated at the predicted mid-point and moved to the contraction reached; the motion is exact for
+the force linearised about that mid-point with the effective pressure going straight from its old to
+its new value. So the step is of second order and has no stability limit from the stiffness of a
+light load.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from pam_envs.constants import GRAVITY
-from pam_envs.hysteresis import protocol
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.history import N_HISTORY
@@ -25,7 +23,10 @@ from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regul
 
 # placeholders, see hysteresis_kernels
 write_drive: Any = None
-hysteresis_step: Any = None
+hysteresis_ahead: Any = None
+hysteresis_moved: Any = None
+start_friction: Any = None
+hysteresis_begin: Any = None
 
 
 @kernel
@@ -62,6 +63,7 @@ def advance(
         fixed[R.MUSCLE_HARDENING],
     )
     braid_strain, set_point, step = fixed[R.MUSCLE_BRAID_STRAIN], rows[R.SET_POINT], counts[R.STEP]
+    rub = fixed[R.HYSTERESIS_FRICTION]
     older, newer, switch, was, damped = work[3], work[4], work[5], work[6], work[7]
     per_lag, per_slew, per_mass, per_length = work[8], work[9], work[10], work[11]
     per_strain, per_jerk, drag, late, width = work[12], work[13], work[14], work[15], work[16]
@@ -100,6 +102,7 @@ def advance(
                 )
                 pressure[j] = reached if width[j] > 0.0 else pressure[j]
             write_drive(rows, fixed, counts, table, hysteresis, 0, LANES, elements, work)
+        hysteresis_ahead(rows, fixed, counts, table, hysteresis, 0, LANES, elements, 0.5 * h)
         for j in range(LANES):
             ahead = 0.5 * h * v[j]
             e = (x[j] + ahead) * per_length[j]
@@ -115,11 +118,14 @@ def advance(
                 k1[j],
                 k3[j],
             )
+            pull = pull - rub[j] * rows[R.LAG][j]
+            slope = slope + rub[j] * rows[R.STICK][j]
             k = slope * per_length[j] * per_mass[j]
             a = (pull - load[j] * GRAVITY) * per_mass[j] + k * ahead
             jerk = area[j] * (1.0 - taper[j] * e) * (drive[j] - was[j]) * per_jerk[j]
             dx, v[j] = damped_motion(v[j], a, jerk, k, drag[j], damped[j], h)
             x[j] = x[j] + dx
+        hysteresis_moved(rows, fixed, counts, table, hysteresis, 0, LANES, elements, 0.0)
 
 
 @kernel
@@ -149,24 +155,29 @@ N_WORK = 17
 """Rows of scratch that :func:`advance` needs."""
 
 
+@kernel
+def pull_of(fixed: Any, lane: int, drive: float, e: float) -> float:
+    """Return the force of the law [N] at an effective pressure [Pa] and a strain."""
+    return tension(
+        drive,
+        e,
+        decay(e / fixed[R.MUSCLE_BRAID_STRAIN][lane]),
+        fixed[R.MUSCLE_AREA][lane],
+        fixed[R.MUSCLE_AREA_TAPER][lane],
+        fixed[R.MUSCLE_BRAID_FORCE][lane],
+        fixed[R.MUSCLE_STIFFNESS][lane],
+        fixed[R.MUSCLE_HARDENING][lane],
+    )
+
+
 @routine
 def rest_contraction(fixed: Any, lane: int, drive: float, load: float) -> float:
-    """Return the contraction [m] at rest, by bisection to the last bit that matters."""
+    """Return the contraction [m] at rest without friction, by bisection to rounding."""
     length = fixed[R.MUSCLE_REST_LENGTH][lane]
     low, high = -0.3, 0.6
     for _ in range(56):
         e = 0.5 * (low + high)
-        pull = tension(
-            drive,
-            e,
-            decay(e / fixed[R.MUSCLE_BRAID_STRAIN][lane]),
-            fixed[R.MUSCLE_AREA][lane],
-            fixed[R.MUSCLE_AREA_TAPER][lane],
-            fixed[R.MUSCLE_BRAID_FORCE][lane],
-            fixed[R.MUSCLE_STIFFNESS][lane],
-            fixed[R.MUSCLE_HARDENING][lane],
-        )
-        if pull > load * GRAVITY:
+        if pull_of(fixed, lane, drive, e) > load * GRAVITY:
             low = e
         else:
             high = e
@@ -174,67 +185,47 @@ def rest_contraction(fixed: Any, lane: int, drive: float, load: float) -> float:
 
 
 @kernel
-def stretched(pressure: float, stretch: float, per_full: float) -> float:
-    """Return the pressure on the scale on which the friction is uniform.
-
-    ``g(p) = p (1 + b (1 - p / P))``: with ``b > 0`` the loop is wider at high pressure.
-    ``per_full`` is ``1 / P``.
-    """
-    return pressure * (1.0 + stretch * (1.0 - pressure * per_full))
+def excess_pull(rows: Any, fixed: Any, j: int, e: float) -> float:
+    """Return the force [N] of one lane at a strain beyond the load's weight."""
+    return pull_of(fixed, j, rows[R.DRIVE][j], e) - rows[R.LOAD][j] * GRAVITY  # type: ignore[no-any-return]
 
 
 @kernel
-def unstretched(value: float, stretch: float, per_full: float) -> float:
-    """Return the pressure whose stretched value is ``value``."""
-    s = 1.0 + stretch
-    return 2.0 * value / (s + math.sqrt(max(0.0, s * s - 4.0 * stretch * value * per_full)))
+def hang_load(rows: Any, fixed: Any, j: int) -> None:
+    """Do nothing: the load of a plain plant always hangs freely."""
 
 
-@kernel
-def loop_width(width_per_load: float, load: float) -> float:
-    """Return the factor on the hysteretic part at this load, from 0 to 1.2."""
-    return max(0.0, min(1.2, 1.0 + width_per_load * load))
-
-
-@kernel
-def pressure_itself(
-    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
-    elements: int, work: Any,
-) -> None:  # fmt: skip
-    """Write the pressure as effective pressure."""
-    pressure, drive = rows[R.PRESSURE], rows[R.DRIVE]
-    for j in range(first, last):
-        drive[j] = pressure[j]
-
-
-@kernel
-def effective_pressure(
-    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
-    elements: int, work: Any,
-) -> None:  # fmt: skip
-    """Write the effective pressure by a hysteresis model on the stretched scale."""
-    pressure, drive, stretch, full = (
-        rows[R.PRESSURE],
-        rows[R.DRIVE],
-        fixed[R.HYSTERESIS_STRETCH],
-        fixed[R.REGULATOR_MAX_PRESSURE],
+@routine
+def begin_rest(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
+) -> None:
+    """Put one lane at its position of rest without pressure, free of friction."""
+    rows[R.CONTRACTION][j], rows[R.VELOCITY][j] = rows[R.REST][j], 0.0
+    hysteresis_begin(
+        rows, fixed, counts, table, elements, hysteresis, R.MODEL, R.STACK_COUNT, R.MEMBER, j
     )
-    load, per_load = rows[R.LOAD], fixed[R.HYSTERESIS_WIDTH_PER_LOAD]
-    inputs, output, per_full = work[0], work[1], work[2]
-    for j in range(first, last):
-        per_full[j] = 1.0 / full[j]
-        inputs[j] = stretched(pressure[j], stretch[j], per_full[j])
-    hysteresis_step(
-        inputs, output, rows, fixed, counts, table, elements, hysteresis, R.MODEL, R.STACK_COUNT,
-        R.MEMBER, first, last,
-    )  # fmt: skip
-    for j in range(first, last):
-        friction = inputs[j] - output[j]
-        value = inputs[j] - loop_width(per_load[j], load[j]) * friction
-        drive[j] = unstretched(value, stretch[j], per_full[j])
+    start_friction(rows, fixed, hysteresis, elements, j)
+    hang_load(rows, fixed, j)
 
 
-def hysteresis_kernels(kind: str, name: str = "write_drive") -> dict[str, Any]:
-    """Return the kernels of a kind; ``name`` is the plant's placeholder for the whole."""
-    identity = protocol.model_of(kind).identity
-    return protocol.kernels(kind) | {name: pressure_itself if identity else effective_pressure}
+@routine
+def slide_to_rest(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
+) -> None:
+    """Put one lane at rest at its effective pressure and load, by bisection, with its friction.
+
+    The friction is that of motion straight from the contraction before.
+    """
+    length = fixed[R.MUSCLE_REST_LENGTH][j]
+    low, high = -0.3, 0.6
+    for _ in range(56):
+        e = 0.5 * (low + high)
+        rows[R.CONTRACTION][j] = e * length
+        hysteresis_ahead(rows, fixed, counts, table, hysteresis, j, j + 1, elements, 0.0)
+        rub = fixed[R.HYSTERESIS_FRICTION][j] * rows[R.LAG][j]
+        if excess_pull(rows, fixed, j, e) > rub:
+            low = e
+        else:
+            high = e
+    rows[R.CONTRACTION][j] = 0.5 * (low + high) * length
+    hysteresis_moved(rows, fixed, counts, table, hysteresis, j, j + 1, elements, 0.0)

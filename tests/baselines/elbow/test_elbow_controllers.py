@@ -101,7 +101,7 @@ def test_estimate_with_friction_is_the_torque_of_the_bundles():
     view = make_elbow_signal_map(spec_of(env))
     friction, action = make_elbow_friction(env.plant, known=True), np.array([1e5, 2e5], np.float32)
     observation, _ = env.reset(seed=4)
-    state, off = friction.hysteresis.initial(1), []
+    state, off = friction.initial(1), []
     for _ in range(299):
         seen = view.read(observation)
         state = friction.losses(seen, state)[1]

@@ -10,7 +10,9 @@ from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.regulator import regulator_step
 
 
-@pytest.fixture(params=["maxwell_slip", "preisach", "none"])
+@pytest.fixture(
+    params=["maxwell_slip", "preisach", "maxwell_slip_length", "preisach_length", "none"]
+)
 def plant(request):
     return SingleMuscle.mas10(request.param)
 
@@ -19,7 +21,7 @@ PATH = np.concatenate([np.linspace(0, 5.5e5, 9), np.linspace(5e5, 1e5, 7), [3e5,
 
 
 def test_nominal_hysteresis_equals_that_of_the_plant(plant):
-    muscle, own = Nominal(plant).at(2.55), plant.hysteresis.inverse(2.55, 6e5)
+    muscle, own = Nominal(plant).at(2.55), plant.hysteresis_inverse(2.55)
     state, theirs = muscle.hysteresis.initial(1), own.initial_state((1,))
     for pressure in PATH:
         drive, state = muscle.advance(np.array([pressure]), state)

@@ -96,5 +96,7 @@ def test_page_lists_arguments_and_defaults(name: str) -> None:
             value = ast.literal_eval(said.strip("`"))
         except (SyntaxError, ValueError):
             continue  # words, or nothing
-        resolved = {"hysteresis": "maxwell_slip", "pace": "slow"}.get(argument)
+        resolved = {
+            "hysteresis": "maxwell_slip", "hysteresis_drive": "pressure", "pace": "slow",
+        }.get(argument)  # fmt: skip
         assert value == (resolved if default is None and resolved else default), argument

@@ -1,0 +1,385 @@
+"""Friction elements driven by length, whose slip force may change along a history: passive models.
+
+Springs of constant stiffness, each in series with a slider of its own (albender2005). The lag of
+such a model, in the unit of its input, is the force over a stiffness:
+
+    lag(x) = sum_k [phi_k(x) - phi_k(w_k)],    w_k = play(x, r_k limit)
+
+with the sliders' positions ``w_k`` and rising curves ``phi_k``. The springs store
+``phi_k(x) - phi_k(w_k)`` integrated from ``w_k`` to ``x``, and a slip, by motion or because the
+``limit`` falls, only dissipates. So a muscle whose strands press on each other harder at a higher
+pressure is passive in length and pressure, unlike one whose friction *stiffness* depends on
+pressure, or whose pressure has the hysteresis (vominh2011).
+
+:class:`StraightSlip` has straight curves. :class:`PreisachSlip` is a Preisach operator of relays
+with a few half-gaps ``r_k``: a relay that switches up at ``c + r`` and down at ``c - r`` is up
+where the play of threshold ``r`` is above ``c``, so that ``phi_k`` is the integral of the relay
+density over ``c``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.hysteresis.checks import check_not_negative, check_thresholds, floats, width_of
+from pam_envs.hysteresis.elements import THRESHOLD, WEIGHT, move_plays, play
+from pam_envs.hysteresis.protocol import (
+    ELEMENTS,
+    HysteresisModel,
+    Kernels,
+    Start,
+    Usage,
+    padded,
+    register,
+)
+from pam_envs.kernels.build import kernel
+
+Array = NDArray[np.float64]
+
+LIMIT = ELEMENTS
+"""Row of the state, after the sliders, with the factor on the thresholds: the plant writes it."""
+STATE_ROWS = ELEMENTS + 1
+LOW, PER_INPUT = WEIGHT, WEIGHT + 1
+"""Rows of the numbers of curves: their first input, and cells per input."""
+
+
+@kernel
+def slip_begin(
+    rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int, model: int, count: int,
+    member: int, j: int,
+) -> None:  # fmt: skip
+    """Begin with the declared thresholds."""
+    rows[at + LIMIT][j] = 1.0
+
+
+@kernel
+def straight_lag(
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, x_at: int,
+    lag_at: int, operators: int, model: int, count: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Advance the sliders and write the lags (:class:`~pam_envs.hysteresis.protocol.Kernels`)."""
+    for m in range(operators):
+        at = state + m * STATE_ROWS
+        x, lag, limit = rows[x_at + m], rows[lag_at + m], rows[at + LIMIT]
+        for j in range(first, last):
+            lag[j] = 0.0
+        for k in range(elements):
+            threshold, weight = fixed[model + THRESHOLD + k], fixed[model + WEIGHT + k]
+            position = rows[at + k]
+            for j in range(first, last):
+                w = play(x[j], threshold[j] * limit[j], position[j])
+                position[j] = w
+                lag[j] = lag[j] + weight[j] * (x[j] - w)
+
+
+@kernel
+def straight_peek(
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, x_at: int,
+    lag_at: int, stick_at: int, operators: int, model: int, count: int, member: int, first: int,
+    last: int,
+) -> None:  # fmt: skip
+    """Write the lags at inputs and their slopes, the weight of the sliders that do not move."""
+    for m in range(operators):
+        at = state + m * STATE_ROWS
+        x, lag, stick = rows[x_at + m], rows[lag_at + m], rows[stick_at + m]
+        limit = rows[at + LIMIT]
+        for j in range(first, last):
+            lag[j] = 0.0
+            stick[j] = 0.0
+        for k in range(elements):
+            threshold, weight = fixed[model + THRESHOLD + k], fixed[model + WEIGHT + k]
+            position = rows[at + k]
+            for j in range(first, last):
+                w = play(x[j], threshold[j] * limit[j], position[j])
+                lag[j] = lag[j] + weight[j] * (x[j] - w)
+                stick[j] = stick[j] + (weight[j] if w == position[j] else 0.0)
+
+
+@kernel
+def curve_value(u: float, curve: Any) -> float:
+    """Return a curve at ``u`` cells from its first knot, straight beyond its ends."""
+    i = max(0, min(int(u), len(curve) - 2))
+    return curve[i] + (u - i) * (curve[i + 1] - curve[i])  # type: ignore[no-any-return]
+
+
+@kernel
+def curve_slope(u: float, curve: Any) -> float:
+    """Return the slope of a curve, per cell."""
+    i = max(0, min(int(u), len(curve) - 2))
+    return curve[i + 1] - curve[i]  # type: ignore[no-any-return]
+
+
+@kernel
+def curved_lag(
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, x_at: int,
+    lag_at: int, operators: int, model: int, count: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Advance the sliders and write the lags (:class:`~pam_envs.hysteresis.protocol.Kernels`)."""
+    low, per, members = fixed[model + LOW], fixed[model + PER_INPUT], counts[member]
+    for m in range(operators):
+        at = state + m * STATE_ROWS
+        x, lag, limit = rows[x_at + m], rows[lag_at + m], rows[at + LIMIT]
+        for j in range(first, last):
+            lag[j] = 0.0
+        for k in range(elements):
+            threshold, position = fixed[model + THRESHOLD + k], rows[at + k]
+            for j in range(first, last):
+                w, curve = play(x[j], threshold[j] * limit[j], position[j]), table[members[j]][k]
+                position[j] = w
+                ahead = curve_value((x[j] - low[j]) * per[j], curve)
+                lag[j] = lag[j] + (ahead - curve_value((w - low[j]) * per[j], curve))
+
+
+@kernel
+def curved_peek(
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, x_at: int,
+    lag_at: int, stick_at: int, operators: int, model: int, count: int, member: int, first: int,
+    last: int,
+) -> None:  # fmt: skip
+    """Write the lags at inputs and their slopes, those of the curves whose sliders do not move."""
+    low, per, members = fixed[model + LOW], fixed[model + PER_INPUT], counts[member]
+    for m in range(operators):
+        at = state + m * STATE_ROWS
+        x, lag, stick = rows[x_at + m], rows[lag_at + m], rows[stick_at + m]
+        limit = rows[at + LIMIT]
+        for j in range(first, last):
+            lag[j] = 0.0
+            stick[j] = 0.0
+        for k in range(elements):
+            threshold, position = fixed[model + THRESHOLD + k], rows[at + k]
+            for j in range(first, last):
+                w, curve = play(x[j], threshold[j] * limit[j], position[j]), table[members[j]][k]
+                u = (x[j] - low[j]) * per[j]
+                behind = curve_value((w - low[j]) * per[j], curve)
+                lag[j] = lag[j] + (curve_value(u, curve) - behind)
+                stick[j] = stick[j] + (curve_slope(u, curve) * per[j] if w == position[j] else 0.0)
+
+
+class SlipModel(HysteresisModel):
+    """Base of the friction elements driven by length; slope 1, virgin start."""
+
+    drive: ClassVar[str] = "length"
+    state_rows: ClassVar[int] = STATE_ROWS
+
+    thresholds: tuple[float, ...]
+
+    def _value(self, k: int, x: Array) -> Array:
+        """Return the curve of element ``k`` at inputs."""
+        raise NotImplementedError
+
+    @property
+    def shares(self) -> Array:
+        """Stiffness of each element by cell of the input, over the total, shape (n, cells)."""
+        raise NotImplementedError
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return len(self.thresholds)
+
+    @property
+    def largest_lag(self) -> float:
+        """Largest lag at any input, at the limit 1, to the width of a cell."""
+        return float(np.max(np.dot(self.thresholds, self.shares)))
+
+    def limited(self, limit: float) -> Self:
+        """Return the model with its thresholds scaled."""
+        return replace(self, thresholds=tuple(limit * r for r in self.thresholds))  # type: ignore[type-var]
+
+    def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
+        """Return the positions of the sliders, zeros of shape ``(*batch_shape, n)``."""
+        return np.zeros((*batch_shape, self.elements))
+
+    def lag(self, x: ArrayLike, state: ArrayLike, limit: ArrayLike = 1.0) -> tuple[Array, Array]:
+        """Return the lag at inputs, shape (...), and the positions of the sliders, (..., n).
+
+        ``limit``, shape (...), scales the thresholds. The states given do not change.
+        """
+        x = np.asarray(x, float)
+        thresholds = np.asarray(limit, float)[..., None] * np.array(self.thresholds)
+        w = move_plays(x, thresholds, state)
+        total = np.zeros(w.shape[:-1])
+        for k in range(self.elements):
+            total = total + (self._value(k, x) - self._value(k, w[..., k]))
+        return total, w
+
+    def step(self, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+        """Return the output, the input less its lag, and the state after it."""
+        lag, after = self.lag(x, state)
+        return np.asarray(np.asarray(x, float) - lag), after
+
+    def inverse_step(self, y: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+        """Return the input that gives the output ``y``, by bisection to rounding, and the state."""
+        y = np.asarray(y, float)
+        most = self.largest_lag
+        low, high = y - most, y + most
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            above = self.step(middle, state)[0] > y
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+        x = 0.5 * (low + high)
+        return x, self.step(x, state)[1]
+
+
+@register
+@dataclass(frozen=True)
+class StraightSlip(SlipModel):
+    """Maxwell-slip elements of constant stiffness.
+
+    Parameters
+    ----------
+    thresholds : tuple of float, shape (n,)
+        Distances at which the elements slip, rising, in the unit of the input.
+    weights : tuple of float, shape (n,)
+        Share of each in the stiffness, not negative.
+    """
+
+    kind: ClassVar[str] = "maxwell_slip_length"
+    choice: ClassVar[str | None] = "maxwell_slip"
+    kernels: ClassVar[Kernels] = Kernels(lag=straight_lag, peek=straight_peek, begin=slip_begin)
+
+    thresholds: tuple[float, ...]
+    weights: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "thresholds", floats("thresholds", self.thresholds))
+        object.__setattr__(self, "weights", floats("weights", self.weights))
+        check_thresholds("thresholds", self.thresholds, len(self.weights), "weights")
+        check_not_negative("weights", self.weights, "to dissipate and not create energy")
+
+    @classmethod
+    def resembling(
+        cls, reference: Any, low: float, high: float, levels: int, start: Start
+    ) -> StraightSlip:
+        """Return the elements of a play operator."""
+        thresholds, weights, _ = reference.parts
+        return cls(tuple(thresholds), tuple(weights))
+
+    @property
+    def shares(self) -> Array:
+        """The weights, shape (n, 1)."""
+        return np.array(self.weights)[:, None]
+
+    def scaled(self, width: float, slope: float | None = None) -> StraightSlip:
+        """Return the model with its lag ``width`` times as large."""
+        width = width_of(width)
+        return replace(self, weights=tuple(width * w for w in self.weights))
+
+    def numbers(self, full: float | None = None) -> list[float]:
+        """Return the slope, thresholds and weights, in the rows of a play operator."""
+        idle = [0.0] * (ELEMENTS - self.elements)
+        return padded([1.0, 0.0, *self.thresholds, *idle, *self.weights, *idle])
+
+    def check(self, usage: Usage) -> None:
+        """Refuse too many elements."""
+        if self.elements > ELEMENTS:
+            raise ValueError(
+                f"hysteresis: {self.elements} elements, at most {ELEMENTS} are simulated; merge "
+                "neighbouring thresholds"
+            )
+
+    def _value(self, k: int, x: Array) -> Array:
+        return np.asarray(self.weights[k] * x)
+
+
+@register
+@dataclass(frozen=True)
+class PreisachSlip(SlipModel):
+    """Preisach operator of relays with a few half-gaps.
+
+    Parameters
+    ----------
+    low, high : float
+        Range of the input over which the density is given; the density of the last cell continues
+        beyond it.
+    thresholds : tuple of float, shape (n,)
+        Half-gaps of the relays, rising, in the unit of the input.
+    densities : tuple of tuple of float, shape (n, cells)
+        Stiffness share of the relays of each half-gap, by the mean of their switching inputs in
+        evenly spaced cells from ``low`` to ``high``. Nowhere negative.
+    """
+
+    kind: ClassVar[str] = "preisach_length"
+    choice: ClassVar[str | None] = "preisach"
+    kernels: ClassVar[Kernels] = Kernels(lag=curved_lag, peek=curved_peek, begin=slip_begin)
+
+    low: float
+    high: float
+    thresholds: tuple[float, ...]
+    densities: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        low, high = floats("(low, high)", (self.low, self.high))
+        thresholds = floats("thresholds", self.thresholds)
+        densities = tuple(floats(f"densities[{k}]", r) for k, r in enumerate(self.densities))
+        object.__setattr__(self, "low", low)
+        object.__setattr__(self, "high", high)
+        object.__setattr__(self, "thresholds", thresholds)
+        object.__setattr__(self, "densities", densities)
+        check_thresholds("thresholds", thresholds, len(densities), "densities")
+        if not low < high:
+            raise ValueError(f"low is {low} and high is {high}; low must be below high: swap them")
+        cells = {len(row) for row in densities}
+        if len(cells) != 1 or cells == {0} or len(densities) > ELEMENTS:
+            raise ValueError(
+                f"densities has {len(densities)} rows of {sorted(cells)} cells; give 1 to "
+                f"{ELEMENTS} rows of one length"
+            )
+        for k, row in enumerate(densities):
+            check_not_negative(f"densities[{k}]", row, "to dissipate and not create energy")
+
+    @classmethod
+    def resembling(
+        cls, reference: Any, low: float, high: float, levels: int, start: Start
+    ) -> PreisachSlip:
+        """Return the operator of a play operator: a density that is the same at any input."""
+        thresholds, weights, _ = reference.parts
+        return cls(low, high, tuple(thresholds), tuple((float(w),) for w in weights))
+
+    @cached_property
+    def curves(self) -> Array:
+        """The elements' curves at the knots, shape (n, cells + 1), 0 at ``low``; read-only."""
+        cell = (self.high - self.low) / len(self.densities[0])
+        steps = np.cumsum(self.shares * cell, axis=1)
+        curves = np.concatenate([np.zeros((len(steps), 1)), steps], axis=1)
+        curves.setflags(write=False)
+        return curves
+
+    @property
+    def shares(self) -> Array:
+        """The densities, shape (n, cells)."""
+        return np.array(self.densities)
+
+    def scaled(self, width: float, slope: float | None = None) -> PreisachSlip:
+        """Return the operator with its lag ``width`` times as large."""
+        width = width_of(width)
+        return replace(self, densities=tuple(tuple(width * d for d in r) for r in self.densities))
+
+    def numbers(self, full: float | None = None) -> list[float]:
+        """Return the slope, the thresholds, the first input of the curves and cells per input."""
+        idle = [0.0] * (ELEMENTS - self.elements)
+        per_input = len(self.densities[0]) / (self.high - self.low)
+        return padded([1.0, 0.0, *self.thresholds, *idle, self.low, per_input])
+
+    def table_rows(self) -> Array:
+        """Return the curves."""
+        return self.curves
+
+    def check(self, usage: Usage) -> None:
+        """Refuse a range that is too small."""
+        if self.high < usage.reach:
+            raise ValueError(
+                f"hysteresis: the densities span up to {self.high:g} and {usage.plant} needs "
+                f"{usage.reach:g}: give a wider range"
+            )
+
+    def _value(self, k: int, x: Array) -> Array:
+        curve = self.curves[k]
+        u = (x - self.low) * ((len(curve) - 1) / (self.high - self.low))
+        i = np.clip(u.astype(int), 0, len(curve) - 2)
+        return np.asarray(curve[i] + (u - i) * (curve[i + 1] - curve[i]))
