@@ -36,7 +36,7 @@ def test_joints_pass_with_either_hysteresis_and_unequal_muscles_do_not() -> None
 
 def test_muscle_at_rest_balances_its_load() -> None:
     """Force of the law less friction, computed with separate plays."""
-    joint = AntagonisticJoint.paper()
+    joint = AntagonisticJoint.paper("maxwell_slip")
     operator, hysteresis = joint.hysteresis.operator, joint.hysteresis
     assert isinstance(operator, PlayOperator)
     pressures = 1e5 * np.array([2.0, 6.0, 3.0, 4.5, 1.0, 6.5])

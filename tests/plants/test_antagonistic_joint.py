@@ -22,6 +22,9 @@ ANGLES = np.radians(np.linspace(-28.0, 28.0, 29))
 MADE = (AntagonisticJoint.paper("none"), AntagonisticJoint.measured("none"))
 
 
+KINDS = ("maxwell_slip", "preisach", "maxwell_slip_length", "preisach_length")
+
+
 def half_gap(plant: AntagonisticJoint, degrees: float) -> float:
     """Half the height of a settled loop at setpoint 0, over its amplitude."""
     phase = np.linspace(0.0, 4.5 * np.pi, 181)
@@ -32,7 +35,7 @@ def half_gap(plant: AntagonisticJoint, degrees: float) -> float:
 
 def muscle_under_load(plant: AntagonisticJoint, pressures: np.ndarray) -> np.ndarray:
     """Contractions of one muscle that carries 100 N, at rest after each pressure [Pa]."""
-    plays, hysteresis = contraction_plays(), plant.hysteresis
+    plays, hysteresis = contraction_plays(), joint_hysteresis("maxwell_slip")
     start = float(plant.lever.contraction(0.0, plant.muscle.rest_length)[0])
     state, made = plays.initial_state(), []
     for p in pressures:
@@ -163,17 +166,19 @@ def test_co_contraction_reduces_the_stiffness_of_this_lever() -> None:
 # --- hysteresis ----------------------------------------------------------------------------------
 
 
-def test_loops_have_a_half_gap_of_a_tenth() -> None:
-    plant = AntagonisticJoint.paper("maxwell_slip")
+@pytest.mark.parametrize("kind", KINDS)
+def test_loops_have_a_half_gap_of_a_tenth(kind: str) -> None:
+    plant = AntagonisticJoint.paper(kind)
     assert [half_gap(plant, a) for a in (15.0, 20.0)] == pytest.approx([0.1, 0.1], abs=0.005)
     assert [half_gap(plant, a) for a in (10.0, 29.0)] == pytest.approx([0.08, 0.08], abs=0.01)
     assert half_gap(AntagonisticJoint.paper("none"), 15.0) < 1e-9
-    assert half_gap(AntagonisticJoint.paper(hysteresis__width=0.5), 15.0) < 0.07
+    assert half_gap(AntagonisticJoint.paper(kind, hysteresis__width=0.5), 15.0) < 0.07
 
 
-def test_the_gain_after_a_turn_is_that_of_the_published_uncertainty() -> None:
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_gain_after_a_turn_is_that_of_the_published_uncertainty(kind: str) -> None:
     """35 % less than the nominal one."""
-    rests = AntagonisticJoint.paper().rest_angles(
+    rests = AntagonisticJoint.paper(kind).rest_angles(
         np.radians([20.0, -20.0, 20.0, -20.0, 20.0, 19.0])
     )
     assert np.degrees(rests[-2] - rests[-1]) == pytest.approx(0.65, abs=0.02)
@@ -200,9 +205,11 @@ def test_the_joints_loop_is_symmetric_and_a_muscles_is_not() -> None:
     assert np.abs(there + back - middle).max() > 0.2 * (there.max() - there.min())
 
 
-def test_friction_is_at_most_the_data_sheets_hysteresis() -> None:
+@pytest.mark.parametrize("kind", ["maxwell_slip", "maxwell_slip_length"])
+def test_friction_is_at_most_the_data_sheets_hysteresis(kind: str) -> None:
     """3 % of the nominal length at constant force, at any pressure (fluidic_muscles, sec. 1.1)."""
-    plant, plays = AntagonisticJoint.paper(), contraction_plays()
+    plant = AntagonisticJoint.paper(kind)
+    plays = contraction_plays(plant.hysteresis.drive)
     lag = sum(w * t for w, t in zip(plays.weights, plays.thresholds, strict=True))
     pressures, h = np.linspace(0.5e5, 6.5e5, 13), 1e-5
     for x in np.linspace(0.0, 0.24, 25):
@@ -222,7 +229,7 @@ def test_the_reduced_hysteresis_is_identified_on_the_plant_with_muscles() -> Non
     stops = [
         commands - PlayOperator((r,), (1.0,), 0.0).simulate(commands)[0] for r in made.thresholds
     ]
-    behind = commands - AntagonisticJoint.paper().rest_angles(commands)
+    behind = commands - AntagonisticJoint.paper("maxwell_slip").rest_angles(commands)
     weights, norm = nnls(np.column_stack(stops), behind)
     assert np.allclose(weights, made.weights, atol=1e-3)
     assert math.degrees(norm / np.sqrt(len(commands))) < 0.17

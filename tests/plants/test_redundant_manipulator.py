@@ -84,11 +84,12 @@ def test_the_three_paths_are_within_reach_of_the_hanging_arm() -> None:
     assert strained.pressures_for(planned, torque=weights)[2].any()
 
 
-def test_chain_of_one_joint_equals_the_single_joint() -> None:
+@pytest.mark.parametrize("kind", ["maxwell_slip", "maxwell_slip_length"])
+def test_chain_of_one_joint_equals_the_single_joint(kind: str) -> None:
     """Another integrator, with the same physics."""
     one = SerialChain(("y",), (0.25,), (0.3,), (0.125,), (0.0015625,), (1e-6,))
-    arm = dataclasses.replace(RedundantManipulator.paper("maxwell_slip", one), joint_damping=(0.0,))
-    joint = AntagonisticJoint.paper()
+    arm = dataclasses.replace(RedundantManipulator.paper(kind, one), joint_damping=(0.0,))
+    joint = AntagonisticJoint.paper(kind)
     assert joint.link.inertia == pytest.approx(0.0015625 + 0.3 * 0.125**2)
     commands = steps(80, 22.0 * DEGREE)[:, :1]
     shoves = np.where(np.arange(80) > 40, 0.8, 0.0)[:, None]

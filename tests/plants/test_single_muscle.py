@@ -163,7 +163,7 @@ def test_dead_time_shifts_the_step_and_nothing_else(dead: float) -> None:
 
 def test_neutral_effects_change_no_bit() -> None:
     random = np.random.default_rng(2).uniform(0, 6e5, 200)
-    plant = SingleMuscle.mas10()
+    plant = SingleMuscle.mas10("maxwell_slip")
     same = plant.replace({"muscle.area_taper": 0.0, "position.bias": 0.0})
     assert np.array_equal(
         simulate(plant, random)["contraction"], simulate(same, random)["contraction"]

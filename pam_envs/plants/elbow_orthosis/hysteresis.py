@@ -47,8 +47,8 @@ SLIDING = 0.8
 """Part of the slope that has hysteresis, of either preset."""
 HALF_GAP = 7.75e-3
 """Largest half-gap [m] of the Preisach preset's relays: of 15.5 cells of its map."""
-REFERENCE_PRESSURE = 2e5
-"""Pressure [Pa] at which friction of either drive is the same."""
+REFERENCE_PRESSURE = 5e5
+"""Pressure [Pa] at which friction of either drive is the same: that of the published loops."""
 MIDDLE, REST = 0.3, 9e-3
 """Density of its relays in the middle over that from ``REST`` [m] on either side. Relays so far out
 are all within the paper's stroke of 66 mm, which is why the loop there is the largest one."""

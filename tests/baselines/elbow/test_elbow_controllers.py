@@ -49,7 +49,7 @@ def test_allocation_recovers_the_pressures_of_torque_and_stiffness():
 
 
 def test_allocation_with_friction_gives_the_torque_of_the_bundles():
-    plant = ElbowOrthosis.paper()
+    plant = ElbowOrthosis.paper("maxwell_slip")
     angle, lag = np.array([0.7, 1.4]), np.array([2e-3, -1e-3])
     friction = plant.friction(lag)
     torque = np.array([1.0, -2.0])
@@ -61,7 +61,10 @@ def test_allocation_with_friction_gives_the_torque_of_the_bundles():
     assert np.allclose(plant.stiffness(angle, a, b), 4.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach", "none"])
+@pytest.mark.parametrize(
+    "hysteresis",
+    ["maxwell_slip", "preisach", "maxwell_slip_length", "preisach_length", "none"],
+)
 def test_hysteresis_is_compensated_exactly_without_lag(hysteresis):
     env = make_elbow(plant=quiet(hysteresis, prompt=True), reference="free", motion="sines",
                    episode_seconds=6.0)  # fmt: skip

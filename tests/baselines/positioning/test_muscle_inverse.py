@@ -30,18 +30,27 @@ def test_single_branch_errs_by_the_loop_width(name, hysteresis, staircase, settl
     assert np.sqrt(np.mean(errors**2)) > 3e-4
 
 
-@pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
-def test_slow_ramp_is_tracked_within_10_um(hysteresis):
+@pytest.mark.parametrize(
+    "hysteresis, bound",
+    [
+        ("maxwell_slip", 1e-5),
+        ("preisach", 1e-5),
+        ("maxwell_slip_length", 2e-5),
+        ("preisach_length", 2e-5),
+    ],
+)
+def test_slow_ramp_is_tracked(hysteresis, bound):
+    """Friction driven by length slips with the motion, whose lag behind rest adds to the error."""
     ramp = np.interp(np.arange(1200), [0, 500, 800, 1200], [2e-3, 12e-3, 6e-3, 9e-3])
     plant = SingleMuscle.mas10(hysteresis).replace(QUIET)  # the regulator's own dead time and lag
     env = make_env(plant=plant, load=2.55, reference=ramp, episode_seconds=12.0)
     record = rollout(env, built("inverse", env))
     away = np.min(np.abs(np.arange(1, 1201)[:, None] - [0, 500, 800]), axis=1) > 40
-    assert np.abs(record["output"] - record["reference"])[away].max() < 1e-5
+    assert np.abs(record["output"] - record["reference"])[away].max() < bound
 
 
 def test_preview_removes_the_delay():
-    plant = SingleMuscle.mas10().replace(QUIET)
+    plant = SingleMuscle.mas10("maxwell_slip").replace(QUIET)
     env = make_env(plant=plant, reference="sines", episode_seconds=8.0)
     with_it, without = (
         rollout(env, built(name, env)) for name in ("inverse", "inverse_no_preview")
