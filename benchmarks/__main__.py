@@ -283,6 +283,19 @@ def papers(json: Path | None = None) -> int:
     return 1 if any(figure.passed is False for figure in figures) else 0
 
 
+def effort(seeds: int = 10, wearer: Literal["prescribed", "adaptive"] = "prescribed") -> int:
+    """Print the EMG-proxy effort of gaits without, with perfect and with random assistance.
+
+    Args:
+        seeds: Episodes of each controller.
+        wearer: Wearer of the orthosis.
+    """
+    from benchmarks.effort import efforts
+
+    print(efforts(seeds, wearer))
+    return 0
+
+
 def energy(cycles: int = 2000, seed: int = 0) -> int:
     """Print the net work of plants on random closed cycles of pressure and position.
 
@@ -458,6 +471,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "show-row": show_row,
     "tune": tune,
     "papers": papers,
+    "effort": effort,
     "energy": energy,
     "speed": speed,
     "show": show,

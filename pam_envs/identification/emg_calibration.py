@@ -22,7 +22,7 @@ from pam_envs.constants import GRAVITY
 from pam_envs.mechanics.leg import centre_of_pressure
 from pam_envs.muscle.emg import CONSTANTS, Reading, emg_proxy
 from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
-from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE, gait_curves
+from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE, gait_curves, shared_load
 from pam_envs.sensing.butterworth import PERIOD, filtered
 from pam_envs.sensing.shoe import estimated_torque, heel_load
 
@@ -51,11 +51,13 @@ def stride_torques(
     leg, shoe = plant.leg, plant.shoe
     n = round(stride / PERIOD)
     curves = gait_curves(activity, np.arange(STRIDES * n) / n)
-    vertical = curves["ground_z"] * leg.body_mass * GRAVITY
     quick, sole = NATURAL_STRIDE / stride, (shoe.heel, shoe.tip)
+    other = gait_curves(activity, 0.5 + np.arange(STRIDES * n) / n)["ground_z"]
+    loaded = np.asarray(shared_load(curves["ground_z"], other, quick))  # type: ignore[arg-type]
+    vertical = loaded * leg.body_mass * GRAVITY
     cop = [
         centre_of_pressure(r, x, z, quick, leg.aim_height, *sole)
-        for r, x, z in zip(curves["cop"], curves["ground_x"], curves["ground_z"], strict=True)
+        for r, x, z in zip(curves["cop"], curves["ground_x"], loaded, strict=True)
     ]
     torque = estimated_torque(vertical, np.array(cop), np.sin(curves["shank"]), leg.shank)  # type: ignore[arg-type]
     heel = [heel_load(f, r, *sole) for f, r in zip(vertical, cop, strict=True)]

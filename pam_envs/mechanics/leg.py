@@ -19,6 +19,11 @@ direction:
 In stance this models the wearer's posture and not the bodies above the knee. Past the relaxed angle
 of the brace's wire, where the pneumatic muscle cannot compensate the torque of the wire, the wearer
 bears a share of this torque (``habituation``).
+
+A *prescribed* wearer (``adaptation = 0``) gives up effort by all the assistance, at once. An
+*adaptive* one gives up what is expected, part by part of the stride: the expectation follows the
+assistance of the last strides and is forgotten (emken2007); the rest meets a stretch reflex and
+both muscle groups, so that assistance that comes as a surprise saves nothing.
 """
 
 from __future__ import annotations
@@ -35,6 +40,7 @@ _AIM = (
     "least squares on the measured stride give 1.13 m; 0: the centre of pressure as measured"
 )
 _SCALED = "OpenSim segment masses, gait10dof18musc, scaled to the body mass"
+_LEARNED = "first order in strides, emken2007; 0: the wearer is prescribed"
 _SWING = "wearer in swing; of the order of measured knee impedance"
 _STANCE = "gained at full body weight; of the order of measured knee impedance"
 
@@ -64,6 +70,15 @@ class Leg:
         1.0,
         "share of the wire's torque past its relaxed angle borne by the wearer",
         spread=(0.7, 1.0),
+    )
+    reflex: float = assumed(
+        0.0, "N m/rad", 0.0, 100.0, "stiffness of the stretch reflex of an adaptive wearer"
+    )
+    adaptation: float = assumed(
+        0.0, "1", 0.0, 1.0, f"share of the unexpected assistance learned in a stride; {_LEARNED}"
+    )
+    forgetting: float = assumed(
+        0.0, "1", 0.0, 1.0, f"share of the expected assistance forgotten in a stride; {_LEARNED}"
     )
 
 

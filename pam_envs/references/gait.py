@@ -28,7 +28,7 @@ KNEE, SHANK, GROUND_Z, GROUND_X, COP, ANKLE = range(len(SIGNALS))
 ground force over body weight, centre of pressure ahead of the ankle [m], dorsiflexion [rad]."""
 
 NATURAL_STRIDE = 1.224
-"""Duration [s] of the measured stride; horizontal forces are those of this pace."""
+"""Duration [s] of the measured stride; ground forces are those of this pace."""
 PAPER_STRIDE = 5.0
 """Duration [s] of the stride of yeh2010."""
 
@@ -89,8 +89,29 @@ def basis(u: Any, n: Any) -> Any:
 
 @kernel
 def fraction_of_turn(turns: float) -> float:
-    """Return the fraction of a phase, at least 0."""
-    return turns - float(int(turns))
+    """Return the fraction of a phase above -1."""
+    ahead = turns + 1.0 if turns < 0.0 else turns
+    return ahead - float(int(ahead))
+
+
+@kernel
+def shared_load(own: float, other: float, quick: float) -> float:
+    """Return the vertical force of one leg over body weight, at another pace than the natural one.
+
+    The force of both legs fluctuates about the body weight by the acceleration of the centre of
+    mass, whose path does not depend on the pace: the fluctuation grows with the square of the pace
+    ``quick`` over the natural one. The leg keeps its share. ``own`` and ``other`` are the forces of
+    both legs at natural pace, of which one is above 0.
+    """
+    both = own + other
+    return own * ((1.0 + quick * quick * (both - 1.0)) / both)
+
+
+@kernel
+def vertical_load(table: Any, phase: float, quick: float) -> float:
+    """Return the vertical force over body weight at a phase in [0, 1) of a pace."""
+    own = curve(table, GROUND_Z, phase)
+    return shared_load(own, curve(table, GROUND_Z, fraction_of_turn(phase + 0.5)), quick)
 
 
 @kernel

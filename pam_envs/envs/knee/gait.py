@@ -74,8 +74,27 @@ RANDOMISATION = Randomisation(
 default_plant = lru_cache(maxsize=16)(KneeOrthosis.on_leg)
 
 
-def _plant(activity: Activity, given: Common, pace: Any) -> KneeOrthosis:
+STRIDES = {
+    "varied": {"stride.variability": 0.03, "stride.load_variability": 0.02},
+    "identical": {"stride.variability": 0.0, "stride.load_variability": 0.0},
+}
+WEARERS = {
+    "prescribed": {"leg.adaptation": 0.0, "leg.forgetting": 0.0, "leg.reflex": 0.0},
+    "adaptive": {"leg.adaptation": 0.3, "leg.forgetting": 0.05, "leg.reflex": 15.0},
+}
+LEANS = {"shank": {"shoe.flat_foot": 0.0}, "ankle": {"shoe.flat_foot": 1.0}}
+"""Parameters that the arguments ``strides``, ``wearer`` and ``lean`` set."""
+
+
+def _plant(activity: Activity, given: Common, pace: Any, **kinds: str | None) -> KneeOrthosis:
     """Return the orthosis on a leg that the arguments name."""
+    changes: dict[str, float] = {}
+    for name, choices in (("strides", STRIDES), ("wearer", WEARERS), ("lean", LEANS)):
+        if kinds[name] is not None:
+            check_choice(name, kinds[name], tuple(choices))
+            changes |= choices[kinds[name]]  # type: ignore[index]
+        elif given.plant is None and name == "strides":
+            changes |= choices["varied"]
     if isinstance(pace, str):
         check_choice("pace", pace, tuple(PACES))
     stride = PACES.get("slow" if pace is None else pace, pace)
@@ -91,8 +110,8 @@ def _plant(activity: Activity, given: Common, pace: Any) -> KneeOrthosis:
             f"KneeOrthosis.on_leg({activity!r})"
         )
     if given.plant is not None and pace is not None:
-        return made.replace({"stride.time": seconds})
-    return made
+        changes["stride.time"] = seconds
+    return made.replace(changes) if changes else made
 
 
 @environment_arguments(reference="estimate", preview=5, preview_stride=4, episode_seconds=10.0)
@@ -104,6 +123,9 @@ def make_setup(
     assistance: str = "signed",
     mismatch: float = 0.0,
     start: str = "random",
+    strides: str | None = None,
+    wearer: str | None = None,
+    lean: str | None = None,
 ) -> Setup:
     """Return the checked configuration of an environment with the orthosis on a leg.
 
@@ -128,8 +150,17 @@ def make_setup(
         Offset [N] of the tension's reference in swing, where the tension is not tracked.
     start : {"random", "heel_contact"}
         Phase of the stride at the start.
+    strides : {"varied", "identical"}, optional
+        Whether durations and loads of strides differ, by 3 and 2 % (standard deviation), so that
+        the planned stride of the previews is early or late. Default: as in ``plant``, or "varied".
+    wearer : {"prescribed", "adaptive"}, optional
+        Whether the wearer gives up effort at once, or learns over strides what to expect of the
+        orthosis (:mod:`pam_envs.mechanics.leg`). Default: as in ``plant``, or "prescribed".
+    lean : {"shank", "ankle"}, optional
+        Lean of the shank in the estimate: the true one, or that of the paper's ankle
+        potentiometer, which takes the foot to be flat. Default: as in ``plant``, or "shank".
     """
-    made = _plant(activity, given, pace)
+    made = _plant(activity, given, pace, strides=strides, wearer=wearer, lean=lean)
     source, samples = given.reference_of(SOURCES, "N m", 100.0)
     check_choice("assistance", assistance, tuple(ASSISTANCE))
     check_choice("start", start, STARTS)

@@ -25,7 +25,7 @@ from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import SENSED, begin_lane, replacements
 from pam_envs.references import gait as G
-from pam_envs.references.gait import curve, fraction_of_turn
+from pam_envs.references.gait import curve, fraction_of_turn, vertical_load
 from pam_envs.sensing.butterworth import ROWS as FILTER_ROWS
 from pam_envs.sensing.butterworth import butterworth
 from pam_envs.sensing.butterworth import settle as settle_filter
@@ -57,12 +57,13 @@ def planned_sole(
     fixed: Any, gait: Any, phase: float, body_mass: float, j: int
 ) -> tuple[float, float]:
     """Return ground force [N] and centre of pressure [m] at a phase of the planned stride."""
-    loaded = curve(gait, G.GROUND_Z, phase)
+    quick = G.NATURAL_STRIDE / fixed[K.STRIDE_TIME][j]
+    loaded = vertical_load(gait, phase, quick)
     cop = centre_of_pressure(
         curve(gait, G.COP, phase),
         curve(gait, G.GROUND_X, phase),
         loaded,
-        G.NATURAL_STRIDE / fixed[K.STRIDE_TIME][j],
+        quick,
         fixed[K.LEG_AIM_HEIGHT][j],
         fixed[K.SHOE_HEEL][j],
         fixed[K.SHOE_TIP][j],

@@ -18,6 +18,7 @@ from pam_envs.hysteresis.slip import LIMIT
 from pam_envs.kernels.arithmetic import decay, sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import damped_motion
+from pam_envs.kernels.random import uniform
 from pam_envs.mechanics.guide import turn
 from pam_envs.mechanics.knee_lever import assistive_torque, muscle_length
 from pam_envs.mechanics.leg import (
@@ -35,30 +36,80 @@ from pam_envs.references.gait import (
     ANKLE,
     COP,
     GROUND_X,
-    GROUND_Z,
     KNEE,
     NATURAL_STRIDE,
     SHANK,
     curve,
     curve_and_rates,
     fraction_of_turn,
+    vertical_load,
 )
 from pam_envs.sensing.shoe import estimated_torque, heel_load
 
 
-@routine
-def gait_at(rows: Any, fixed: Any, gait: Any, j: int, phase: float) -> None:
-    """Write the stride of one lane at a phase, 0 to 1: path, ground, demand, hold."""
+@kernel
+def varied(fixed: Any, counts: Any, parameter: int, stream: int, stride: int, j: int) -> float:
+    """Return the deviation of one stride, of standard deviation ``fixed[parameter]``."""
+    spread = fixed[parameter][j]
+    if spread == 0.0:
+        return 0.0
+    drawn = uniform(counts[K.KEY_A][j], counts[K.KEY_B][j], stream, stride)
+    return SPREAD * spread * (2.0 * drawn - 1.0)
+
+
+@kernel
+def stride_at(
+    rows: Any, fixed: Any, counts: Any, j: int, time: float
+) -> tuple[float, float, float, float]:
+    """Return the phase, 0 to 1, its rates [1/s, 1/s2] and the factor on the load at a time [s].
+
+    Strides begin early or late by random shares of a stride, and go smoothly from one to the next.
+    """
     pace = 1.0 / fixed[K.STRIDE_TIME][j]
+    turns = rows[K.START_PHASE][j] + time / fixed[K.STRIDE_TIME][j]
+    number = int(turns)
+    if rows[K.STRIDE_NUMBER][j] != number:
+        rows[K.STRIDE_NUMBER][j] = number
+        rows[K.EARLY][j] = HALF_ROOT * varied(
+            fixed, counts, K.STRIDE_VARIABILITY, STRIDE_STREAM, number, j
+        )
+        rows[K.NEXT_EARLY][j] = HALF_ROOT * varied(
+            fixed, counts, K.STRIDE_VARIABILITY, STRIDE_STREAM, number + 1, j
+        )
+        rows[K.HEAVY][j] = varied(
+            fixed, counts, K.STRIDE_LOAD_VARIABILITY, STRIDE_STREAM + 1, number, j
+        )
+        rows[K.NEXT_HEAVY][j] = varied(
+            fixed, counts, K.STRIDE_LOAD_VARIABILITY, STRIDE_STREAM + 1, number + 1, j
+        )
+    early, heavy = rows[K.EARLY][j], rows[K.HEAVY][j]
+    gain, growth = rows[K.NEXT_EARLY][j] - early, rows[K.NEXT_HEAVY][j] - heavy
+    u = turns - float(number)
+    v, area = 1.0 - u, u * (1.0 - u)
+    step = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
+    return (
+        fraction_of_turn(turns + early + gain * step),
+        pace * (1.0 + 30.0 * gain * area * area),
+        60.0 * pace * pace * gain * area * (v - u),
+        1.0 + heavy + growth * step,
+    )
+
+
+@routine
+def gait_at(rows: Any, fixed: Any, counts: Any, gait: Any, j: int, time: float) -> None:
+    """Write the stride of one lane at a time [s]: path, ground, demand, hold."""
+    phase, pace, hurry, heavy = stride_at(rows, fixed, counts, j, time)
     knee, knee_turn, knee_bend = curve_and_rates(gait, KNEE, phase)
     lean, lean_turn, lean_bend = curve_and_rates(gait, SHANK, phase)
-    weight = fixed[K.LEG_BODY_MASS][j] * GRAVITY
-    loaded = curve(gait, GROUND_Z, phase)
-    quick = NATURAL_STRIDE * pace
+    weight = fixed[K.LEG_BODY_MASS][j] * GRAVITY * heavy
+    quick = NATURAL_STRIDE / fixed[K.STRIDE_TIME][j]
+    loaded = vertical_load(gait, phase, quick)
+    knee_bend = knee_bend * pace * pace + knee_turn * hurry
+    lean_bend = lean_bend * pace * pace + lean_turn * hurry
     rows[K.PHASE][j] = phase
     rows[K.KNEE][j] = knee
     rows[K.KNEE_RATE][j] = knee_turn * pace
-    rows[K.KNEE_ACCELERATION][j] = knee_bend * pace * pace
+    rows[K.KNEE_ACCELERATION][j] = knee_bend
     rows[K.SHANK][j] = lean
     rows[K.ANKLE][j] = curve(gait, ANKLE, phase)
     rows[K.GROUND_Z][j] = weight * loaded
@@ -76,11 +127,11 @@ def gait_at(rows: Any, fixed: Any, gait: Any, j: int, phase: float) -> None:
     ahead, up = knee_acceleration(
         knee - lean,
         (knee_turn - lean_turn) * pace,
-        (knee_bend - lean_bend) * pace * pace,
+        knee_bend - lean_bend,
         fixed[K.LEG_THIGH][j],
     )
     sine, cosine = sine_and_cosine(lean)
-    balance(rows, fixed, j, sine, cosine, ahead, up, lean_bend * pace * pace)
+    balance(rows, fixed, j, sine, cosine, ahead, up, lean_bend)
     restoring = gravity_stiffness(
         sine, cosine, ahead, up, fixed[K.LEG_MASS][j], fixed[K.LEG_CENTRE][j]
     )
@@ -135,20 +186,83 @@ def start_muscles(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def torque_expected(rows: Any, fixed: Any, j: int, phase: float) -> float:
+    """Return the assistance [N m] that an adaptive wearer expects at a phase."""
+    if fixed[K.LEG_ADAPTATION][j] == 0.0:
+        return 0.0
+    place = phase * BINS + (BINS - 0.5)
+    k = int(place)
+    share = place - float(k)
+    first, second = rows[K.EXPECTED + k % BINS][j], rows[K.EXPECTED + (k + 1) % BINS][j]
+    return first + share * (second - first)  # type: ignore[no-any-return]
+
+
+@kernel
+def learn(rows: Any, fixed: Any, j: int, period: float) -> None:
+    """Advance reflex and expectation of an adaptive wearer by a control period.
+
+    In each part of the stride, the expected assistance moves towards the mean that was delivered
+    there, and is forgotten at a rate, once a stride.
+    """
+    rate, k = fixed[K.LEG_ADAPTATION][j], int(rows[K.PHASE][j] * BINS)
+    if rate == 0.0:
+        return
+    left = left_of_gap(period, REFLEX_LAG)
+    aim = fixed[K.LEG_REFLEX][j] * rows[K.DEVIATION][j]
+    rows[K.REFLEX][j] = aim + (rows[K.REFLEX][j] - aim) * left
+    was = int(rows[K.FELT_PART][j])
+    if k != was:
+        if rows[K.FELT_COUNT][j] > 0.0:
+            mean, old = rows[K.FELT][j] / rows[K.FELT_COUNT][j], rows[K.EXPECTED + was][j]
+            gap = rate * (mean - old) - fixed[K.LEG_FORGETTING][j] * old
+            rows[K.EXPECTED + was][j] = old + gap
+        rows[K.FELT_PART][j], rows[K.FELT][j], rows[K.FELT_COUNT][j] = k, 0.0, 0.0
+    rows[K.FELT][j] = rows[K.FELT][j] + rows[K.TORQUE][j]
+    rows[K.FELT_COUNT][j] = rows[K.FELT_COUNT][j] + 1.0
+
+
+@kernel
+def borne(rows: Any, fixed: Any, j: int) -> tuple[float, float]:
+    """Return the torques [N m] that extensors and flexors bear.
+
+    What an adaptive wearer expects is saved by the muscles that would bear it. What is unexpected
+    meets both groups, which hold the knee together: one is relieved of half of it, the other bears
+    the other half.
+    """
+    demand, torque = rows[K.DEMAND][j], rows[K.TORQUE][j]
+    if fixed[K.LEG_ADAPTATION][j] == 0.0:
+        return demand - torque, torque - demand
+    expected = torque_expected(rows, fixed, j, rows[K.PHASE][j])
+    planned, half = demand - expected, 0.5 * (torque - expected)
+    extend, flex = max(0.0, planned) - half, max(0.0, -planned) + half
+    return extend - min(0.0, flex), flex - min(0.0, extend)
+
+
+@kernel
 def share_muscles(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Advance the activations, with the orthosis' torque as delivered and without it."""
     risen = left_of_gap(period, fixed[K.ACTIVATION_RISE_TIME][j])
     fallen = left_of_gap(period, fixed[K.ACTIVATION_FALL_TIME][j])
     demand = rows[K.DEMAND][j]
-    rest = demand - rows[K.TORQUE][j]
-    rows[K.QUADS][j] = activation(rows[K.QUADS][j], excite(fixed, j, rest), risen, fallen)
-    rows[K.FLEXORS][j] = activation(rows[K.FLEXORS][j], excite(fixed, j, -rest), risen, fallen)
+    extend, flex = borne(rows, fixed, j)
+    rows[K.QUADS][j] = activation(rows[K.QUADS][j], excite(fixed, j, extend), risen, fallen)
+    rows[K.FLEXORS][j] = activation(rows[K.FLEXORS][j], excite(fixed, j, flex), risen, fallen)
     free = excite(fixed, j, demand)
     rows[K.QUADS_FREE][j] = activation(rows[K.QUADS_FREE][j], free, risen, fallen)
     free = excite(fixed, j, -demand)
     rows[K.FLEXORS_FREE][j] = activation(rows[K.FLEXORS_FREE][j], free, risen, fallen)
 
 
+BINS = K.PARTS
+"""Parts of a stride in which an adaptive wearer learns apart."""
+REFLEX_LAG = 0.05
+"""Lag [s] of the stretch reflex of the knee."""
+SPREAD = 1.7320508075688772
+"""Half-width of an even distribution over its standard deviation."""
+HALF_ROOT = 0.7071067811865476
+"""Deviation of a stride's begin over that of its duration, which has two such ends."""
+STRIDE_STREAM = 20
+"""Random stream of the strides' begins; the next one is that of their loads."""
 WAS, HELD, HELD_RATE, KNEE_WAS, RATE_WAS, FORCE_WAS = range(6)
 """Rows of scratch: stiffness before the sub-step, then the wearer's hold and path."""
 N_WORK = 6
@@ -319,12 +433,6 @@ def swing_free(
 
 
 @kernel
-def phase_of(rows: Any, fixed: Any, j: int, time: float) -> float:
-    """Return the phase of the stride, 0 to 1, at a time [s] of the episode."""
-    return fraction_of_turn(rows[K.START_PHASE][j] + time / fixed[K.STRIDE_TIME][j])
-
-
-@kernel
 def begin_period_leg(
     rows: Any, fixed: Any, counts: Any, gait: Any, period: float, work: Any
 ) -> None:
@@ -333,7 +441,7 @@ def begin_period_leg(
         stiffness, damping = rows[K.HOLD][j], rows[K.HOLD_RATE][j]
         work[KNEE_WAS][j], work[RATE_WAS][j] = rows[K.KNEE][j], rows[K.KNEE_RATE][j]
         work[FORCE_WAS][j] = rows[K.KNEE_ACCELERATION][j]
-        gait_at(rows, fixed, gait, j, phase_of(rows, fixed, j, (counts[K.STEP][j] + 1) * period))
+        gait_at(rows, fixed, counts, gait, j, (counts[K.STEP][j] + 1) * period)
         work[HELD][j] = 0.5 * (stiffness + rows[K.HOLD][j])
         work[HELD_RATE][j] = 0.5 * (damping + rows[K.HOLD_RATE][j])
 
@@ -351,10 +459,10 @@ def follow_leg(
     )
     held, held_rate, mount = work[HELD], work[HELD_RATE], fixed[K.LEVER_MOUNT_ANGLE]
     for j in range(LANES):
-        pace = 1.0 / fixed[K.STRIDE_TIME][j]
         time = (counts[K.STEP][j] * per_substep + (i + 1)) * h
-        knee, turn, bend = curve_and_rates(gait, KNEE, phase_of(rows, fixed, j, time))
-        turn, bend = turn * pace, bend * pace * pace
+        phase, pace, hurry, _ = stride_at(rows, fixed, counts, j, time)
+        knee, turn, bend = curve_and_rates(gait, KNEE, phase)
+        turn, bend = turn * pace, bend * pace * pace + turn * hurry
         ahead, per_inertia = (
             0.5 * h * rate[j],
             1.0 / (fixed[K.LEG_INERTIA][j] + fixed[K.LEVER_INERTIA][j]),
@@ -366,6 +474,8 @@ def follow_leg(
         old = old + along_path(fixed, j, work[RATE_WAS][j], work[FORCE_WAS][j])
         old = old - habituated(fixed, j, work[KNEE_WAS][j])
         new = new + along_path(fixed, j, turn, bend) - habituated(fixed, j, knee)
+        own = rows[K.REFLEX][j] - torque_expected(rows, fixed, j, phase)
+        old, new = old + own, new + own
         slope = 0.5 * (slope_old + slope_new)
         du, rate[j] = damped_motion(
             rate[j],
@@ -434,6 +544,7 @@ def report_leg(rows: Any, fixed: Any, j: int, period: float) -> None:
     rows[K.ANGLE][j], rows[K.VELOCITY][j] = angle, rate
     report_alone(rows, fixed, j, period)
     rows[K.TORQUE][j] = delivered(rows, fixed, j, rows[K.TORQUE][j])
+    learn(rows, fixed, j, period)
     share_muscles(rows, fixed, j, period)
 
 
@@ -446,7 +557,9 @@ def delivered(rows: Any, fixed: Any, j: int, torque: float) -> float:
     path = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
     off, rate = rows[K.DEVIATION][j], rows[K.DEVIATION_RATE][j]
     drag = (rows[K.HOLD_RATE][j] + fixed[K.LEVER_DAMPING][j]) * rate
+    own = rows[K.REFLEX][j] - torque_expected(rows, fixed, j, rows[K.PHASE][j])
     pull = torque + path - habituated(fixed, j, rows[K.KNEE][j]) + rows[K.HOLD][j] * off + drag
+    pull = pull + own
     sway = -pull / (fixed[K.LEG_INERTIA][j] + fixed[K.LEVER_INERTIA][j])
     return torque + path + fixed[K.LEVER_DAMPING][j] * rate + fixed[K.LEVER_INERTIA][j] * sway
 
@@ -495,7 +608,11 @@ def rest_leg(
     j: int,
 ) -> None:  # fmt: skip
     """Put the knee where the wearer's hold balances the brace, moving along the path."""
-    gait_at(rows, fixed, gait, j, fraction_of_turn(rows[K.START_PHASE][j]))
+    rows[K.STRIDE_NUMBER][j], rows[K.REFLEX][j] = -1.0, 0.0
+    rows[K.FELT][j], rows[K.FELT_COUNT][j], rows[K.FELT_PART][j] = 0.0, 0.0, 0.0
+    for k in range(BINS):
+        rows[K.EXPECTED + k][j] = 0.0
+    gait_at(rows, fixed, counts, gait, j, 0.0)
     load = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
     load = load - habituated(fixed, j, rows[K.KNEE][j])
     angle = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j]

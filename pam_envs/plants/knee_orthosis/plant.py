@@ -30,7 +30,7 @@ from pam_envs.mechanics.knee_lever import KneeLever
 from pam_envs.mechanics.leg import Leg
 from pam_envs.muscle.emg import MuscleActivation
 from pam_envs.muscle.gas_spring import GasSpring
-from pam_envs.parameters import published
+from pam_envs.parameters import assumed, published
 from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.knee_orthosis import rows as K
@@ -68,9 +68,12 @@ class Fixture:
     length: float = published(0.22, "m", 0.05, 1.0, "nominal length, yeh2010, section 4.1")
 
 
+_VARIED = "hausdorff2007: 1 to 3 % of healthy adults' stride times; 2 to 4 % at a slow walk"
+
+
 @dataclass(frozen=True)
 class Stride:
-    """The wearer's pace."""
+    """The wearer's pace, and how strides differ."""
 
     time: float = published(
         PAPER_STRIDE,
@@ -78,6 +81,12 @@ class Stride:
         0.8,
         20.0,
         "5 s a stride, yeh2010, section 5.2; 1.224 s is the natural pace of the measured stride",
+    )
+    variability: float = assumed(
+        0.0, "1", 0.0, 0.1, f"standard deviation of durations over their mean; {_VARIED}"
+    )
+    load_variability: float = assumed(
+        0.0, "1", 0.0, 0.1, f"standard deviation of the strides' ground forces; {_VARIED}"
     )
 
 

@@ -15,15 +15,19 @@ from pam_envs.pneumatics.measured_dynamics import MODE_ROWS, MODES
 
 SENSORS = ("tension", "angle", "pressure", "heel", "ground", "cop", "ankle")
 
+PARTS = 8
+"""Parts of a stride of which an adaptive wearer expects assistance."""
+
 globals().update(
     layout(
         each(
             "angle velocity pressure stiffness set_point old_set_point tension length torque air "
             "old_pressure old_air start_phase phase knee knee_rate knee_acceleration deviation "
             "deviation_rate shank ankle ground_z ground_x cop demand estimate heel stance hold "
-            "hold_rate quads quads_free flexors flexors_free at lag stick rub"
+            "hold_rate quads quads_free flexors flexors_free at lag stick rub stride_number early "
+            "next_early heavy next_heavy reflex felt felt_count felt_part"
         )
-        | {"mode": MODES},
+        | {"mode": MODES, "expected": PARTS},
         dotted(
             regulator="max_pressure time_constant slew_rate",
             hysteresis="width friction empty",
@@ -31,8 +35,9 @@ globals().update(
             lever="arm fittings stiffness relaxed_angle mount_angle inertia damping",
             fixture="length",
             leg="body_mass mass inertia centre shank thigh ankle_height aim_height damping "
-            "stiffness hold_stiffness hold_damping stance_stiffness stance_damping habituation",
-            stride="time",
+            "stiffness hold_stiffness hold_damping stance_stiffness stance_damping habituation "
+            "reflex adaptation forgetting",
+            stride="time variability load_variability",
             shoe="heel tip threshold flat_foot",
             activation="largest_torque floor rise_time fall_time",
             **dict.fromkeys(SENSORS, "noise resolution bias"),

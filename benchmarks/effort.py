@@ -1,0 +1,68 @@
+"""Calibration of the EMG-proxy effort: what assistance could save, and what chance costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import gymnasium as gym
+import numpy as np
+
+from baselines.core.catalogue import make_controller
+from benchmarks.board.format import table
+from benchmarks.runs.rollout import Episode, run
+from benchmarks.scoring.groups.knee import effort_ratio
+from pam_envs.envs.knee.gait import PACES
+from pam_envs.muscle.emg import emg_proxy
+
+GAITS = ("KneeWalk", "KneeStairsUp", "KneeStairsDown")
+COLUMNS = ("gait", "none", "perfect", "perfect, of the true demand", "vented", "random", "x scatter")
+SECONDS = 20.0
+SETTLED = 2.0
+"""Begin [s] of the episode that is not counted."""
+VENTED, RANDOM = "zero", "random"
+
+
+def perfect(episode: Episode, reference: str) -> float:
+    """Return the effort with a desired assistance [N m] delivered exactly in stance."""
+    signals, skipped = episode.signals, round(SETTLED / episode.period)
+    helped = signals[reference] * (signals["state/stance"] > 0.5)
+    proxy = emg_proxy(signals["state/demand"], helped, episode.period)
+    return effort_ratio(*(part[skipped:] for part in vars(proxy).values()))
+
+
+def measured(episode: Episode) -> float:
+    """Return the effort of an episode as it ran."""
+    names = ("extensors", "extensors_free", "flexors", "flexors_free")
+    skipped = round(SETTLED / episode.period)
+    return effort_ratio(*(episode.signals[f"effort/{name}"][skipped:] for name in names))
+
+
+def episodes(name: str, pace: str, wearer: str, controller: str, seeds: int) -> Iterator[Episode]:
+    """Yield episodes of a gait with a controller, one a seed."""
+    env = gym.make(
+        f"PAM/{name}-v0", pace=pace, wearer=wearer, episode_seconds=SECONDS
+    ).unwrapped
+    for seed in range(seeds):
+        made = make_controller(controller, env.plant, env.signals, env.action_signals, seed)  # type: ignore[attr-defined]
+        yield run(env, made, seed)
+
+
+def efforts(seeds: int, wearer: str = "prescribed") -> str:
+    """Return a table of mean and standard deviation of the effort over seeds, for every gait.
+
+    *None* is an orthosis that does nothing, 1 by definition. *Perfect* is the share of Eq. (1), or
+    of the true demand, delivered exactly in stance; *vented* and *random* are episodes. The last
+    column is none less perfect over the scatter of perfect.
+    """
+    lines = []
+    for name in GAITS:
+        for pace in PACES:
+            vented = list(episodes(name, pace, wearer, VENTED, seeds))
+            chance = [measured(e) for e in episodes(name, pace, wearer, RANDOM, seeds)]
+            ideal = [perfect(e, "state/torque_reference") for e in vented]
+            oracle = [perfect(e, "state/torque_ideal") for e in vented]
+            groups = (ideal, oracle, [measured(e) for e in vented], chance)
+            gain = (1.0 - np.mean(ideal)) / np.std(ideal, ddof=1)
+            cells = (f"{np.mean(g):.3f} ± {np.std(g, ddof=1):.3f}" for g in groups)
+            lines.append([f"{name}, {pace} pace", "1", *cells, f"{gain:.1f}"])
+    return "\n".join(table(COLUMNS, lines))
