@@ -15,7 +15,15 @@ from pam_envs.envs.knee.gait import PACES
 from pam_envs.muscle.emg import emg_proxy
 
 GAITS = ("KneeWalk", "KneeStairsUp", "KneeStairsDown")
-COLUMNS = ("gait", "none", "perfect", "perfect, of the true demand", "vented", "random", "x scatter")
+COLUMNS = (
+    "gait",
+    "none",
+    "perfect",
+    "perfect, of the true demand",
+    "vented",
+    "random",
+    "x scatter",
+)
 SECONDS = 20.0
 SETTLED = 2.0
 """Begin [s] of the episode that is not counted."""
@@ -39,9 +47,7 @@ def measured(episode: Episode) -> float:
 
 def episodes(name: str, pace: str, wearer: str, controller: str, seeds: int) -> Iterator[Episode]:
     """Yield episodes of a gait with a controller, one a seed."""
-    env = gym.make(
-        f"PAM/{name}-v0", pace=pace, wearer=wearer, episode_seconds=SECONDS
-    ).unwrapped
+    env = gym.make(f"PAM/{name}-v0", pace=pace, wearer=wearer, episode_seconds=SECONDS).unwrapped
     for seed in range(seeds):
         made = make_controller(controller, env.plant, env.signals, env.action_signals, seed)  # type: ignore[attr-defined]
         yield run(env, made, seed)

@@ -6,11 +6,14 @@ of a single seed is no evidence.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import gymnasium as gym
 
 from agents.policies.policy import OnnxPolicy
 from agents.policies.policy_file import PolicyFileError, read, record_of
@@ -19,6 +22,7 @@ from agents.settings import presets as configs
 from agents.settings.presets import Config
 from agents.settings.schema import SettingsError
 from baselines.core.catalogue import CONTROLLERS as CLASSICAL
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.parameters import Signals
 from pam_envs.wording import near
 
@@ -234,6 +238,25 @@ def check_files(entries: Mapping[str, Entry]) -> None:
                 f"{path.name} is of no preset: there is no {named[1]}.yaml in agents/configs; add "
                 "that, or take the file out"
             )
+
+
+@functools.cache
+def outdated(name: str) -> bool:
+    """Return whether a policy was trained on plants that its environment no longer has.
+
+    Such a policy can be loaded, and is left out of benchmarks until it is trained again.
+    """
+    first = CONTROLLERS[name].first
+    if first is None:
+        return False
+    card = read(first).card
+    kwargs: dict[str, Any] = dict(card.get("env_kwargs", {}))
+    given = [{}] if {"plant", "hysteresis"} & set(kwargs) else [{"hysteresis": h} for h in kinds()]
+    now = set()
+    for kind in given:
+        env: Any = gym.make(card["env"], disable_env_checker=True, **kwargs, **kind)
+        now.add(env.unwrapped.plant.digest())
+    return not now & set(card["plants"])
 
 
 OFFERED: dict[str, Entry] = offered()

@@ -196,7 +196,7 @@ def hysteresis_lines() -> Iterator[Figure]:
         title = f"{name}: error of congruency"
         yield Figure(title, found.congruency, "1", where, at_most=CONGRUENCY)
     for plant in ("paper", "measured"):
-        joint = getattr(AntagonisticJoint, plant)()
+        joint = getattr(AntagonisticJoint, plant)("maxwell_slip")
         for size in (10.0, 15.0, 20.0):
             name = f"{plant} joint, {size:g} deg: loop width without over with inverse"
             ratio = width_ratio(joint, np.radians(size))

@@ -97,8 +97,8 @@ PRESSURES = (0.5e5, 6.5e5)
 def verdicts() -> dict[str, JointHysteresis]:
     """Return the measured hysteresis of two simulated joints and of one of their muscles."""
     joints = {
-        "paper joint": AntagonisticJoint.paper(),
-        "measured joint": AntagonisticJoint.measured(),
+        "paper joint": AntagonisticJoint.paper("maxwell_slip"),
+        "measured joint": AntagonisticJoint.measured("maxwell_slip"),
     }
     found = {
         name: measure_joint(joint.rest_angles, joint.angle_range[1])

@@ -233,7 +233,7 @@ def plant_run(joint: AntagonisticJoint, name: str, size: float) -> Array:
 
 @cache
 def _angles(plant: str, name: str, size: float) -> Array:
-    return plant_run(getattr(AntagonisticJoint, plant)(), name, size)
+    return plant_run(getattr(AntagonisticJoint, plant)("maxwell_slip"), name, size)
 
 
 def plant_step(plant: str, name: str, size: float, turned: bool) -> StepFigures:

@@ -196,7 +196,7 @@ def _label(ax: Any, across: str, up: str, title: str, legend: str) -> None:
 
 
 def _draw_loops(ax: Any) -> None:
-    joint = AntagonisticJoint.paper()
+    joint = AntagonisticJoint.paper("maxwell_slip")
     model = joint_model(joint)
     for known, label, colour in (
         (model.narrowed(0.0), "straight line", "#009e73"),

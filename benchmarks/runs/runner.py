@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -182,12 +183,16 @@ def pairs_of(entrants: Iterable[Entrant], tracks: Iterable[ScenarioSet]) -> list
 
 
 def fits(entrant: Entrant, track: ScenarioSet) -> bool:
-    """Return whether a track has the signals and actions that a policy was trained with.
+    """Return whether a track has the plants, signals and actions of a policy's training.
 
-    They depend on the arguments of the environment, like the valves of the elbow orthosis.
+    Signals and actions depend on the arguments of the environment, like the valves of the elbow
+    orthosis. A policy of plants that its environment no longer has fits no track.
     """
     if entrant.trained_with is None:
         return True
+    outdated = getattr(importlib.import_module(entrant.source), "outdated", None)
+    if outdated is not None and outdated(entrant.name):
+        return False
     bases = [setting.env.unwrapped for setting in tasks.of(track).settings]
     return all(
         entrant.trained_with == (tuple(base.signals.names()), tuple(base.action_signals.names()))

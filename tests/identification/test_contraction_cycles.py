@@ -80,7 +80,9 @@ def test_rank_reveals_unidentifiable_parameters(fits: dict[str, cc.CyclesFit]) -
 
 
 def test_known_muscle_is_recovered_from_its_own_cycles() -> None:
-    true = SingleMuscle.mas10().replace({"muscle.area": 9.5e-4, "hysteresis.width_per_load": -0.03})
+    true = SingleMuscle.mas10("maxwell_slip").replace(
+        {"muscle.area": 9.5e-4, "hysteresis.width_per_load": -0.03}
+    )
     made = [cc.quasi_static(true, CYCLES.pressures, m) for m in CYCLES.loads.tolist()]
     fit = cc.fit_cycles(dataclasses.replace(CYCLES, contractions=np.array(made)))
     assert fit.rms() < 0.02e-3

@@ -256,7 +256,7 @@ def test_page_has_the_verdicts_and_loops() -> None:
         found = made.step
         cells += [f"{found.rise:.3f} s", f"{found.overshoot:.1f} %", f"{found.settling:.2f} s"]
         assert PAGE.row(f"`{made.name}`")[:8] == cells
-    joints = (AntagonisticJoint.paper(), AntagonisticJoint.measured())
+    joints = (AntagonisticJoint.paper("maxwell_slip"), AntagonisticJoint.measured("maxwell_slip"))
     for size in (10, 15, 20):
         ours = [f"{width_ratio(joint, np.radians(size)):.1f}" for joint in joints]
         assert PAGE.row(f"{size} degrees") == ours

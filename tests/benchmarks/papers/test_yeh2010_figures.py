@@ -120,8 +120,12 @@ def test_tension_tracking_preset_dynamic():
     assert 1.4 < wide.with_line / wide.with_inverse < 1.7
 
 
-MISSED = ("error of Eq. (1), 5 s a stride, lean from the shank itself",)
-"""A target that is missed and said to be, by the weight of the shank."""
+MISSED = (
+    "error of Eq. (1), 5 s a stride, lean from the shank itself",
+    "KneeWalk, 10 N, without bumpless transfer: tension error",
+)
+"""Targets that are missed and said to be: by the weight of the shank, and as the load of a slow
+stride shifts more slowly than that of the paper's wearer."""
 
 
 @pytest.mark.parametrize(
@@ -203,7 +207,7 @@ def test_uncalibrated_proxy_at_the_papers_pace():
     whole = gait.uncalibrated_change("walk", 5.0)
     assert exact == pytest.approx(-0.208, abs=0.005)
     assert late == pytest.approx(-0.127, abs=0.005)
-    assert whole == pytest.approx(-0.098, abs=0.005)
+    assert whole == pytest.approx(-0.092, abs=0.005)
     assert gait.uncalibrated_change("walk", 5.0, changes={"leg.aim_height": 0.0}) > -0.06
     assert gait.uncalibrated_change("walk", 1.224) > 0.0
 
@@ -235,7 +239,7 @@ def test_designed_feedback_is_at_least_as_good_as_the_printed_one() -> None:
 
 def test_transient_of_a_switch_with_and_without_bumpless_transfer() -> None:
     smooth, bumpy = (studies.switching(10.0, bumpless=b) for b in (True, False))
-    assert smooth.tension < 15.0 < 40.0 < bumpy.tension
+    assert smooth.tension < 15.0 < 30.0 < bumpy.tension
     assert smooth.excess < 0.5 * bumpy.excess
     assert smooth.tension <= smooth.at_switch + smooth.excess + 1e-9
     assert smooth.command < 0.3e5 < 1e5 < bumpy.command
@@ -245,7 +249,7 @@ def test_transient_of_a_switch_with_and_without_bumpless_transfer() -> None:
 @pytest.mark.parametrize(
     ("activity", "expected"),
     [
-        ("walk", (0.884, 1.004, 0.754, 0.733)),
+        ("walk", (0.891, 1.027, 0.754, 0.733)),
         ("stairs_up", (0.821, 0.886, 0.689, 0.693)),
         ("stairs_down", (0.800, 0.850, 0.729, 0.731)),
     ],
