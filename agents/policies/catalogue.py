@@ -251,7 +251,9 @@ def outdated(name: str) -> bool:
         return False
     card = read(first).card
     kwargs: dict[str, Any] = dict(card.get("env_kwargs", {}))
-    given = [{}] if {"plant", "hysteresis"} & set(kwargs) else [{"hysteresis": h} for h in kinds()]
+    given: list[dict[str, Any]] = (
+        [{}] if {"plant", "hysteresis"} & set(kwargs) else [{"hysteresis": h} for h in kinds()]
+    )
     now = set()
     for kind in given:
         env: Any = gym.make(card["env"], disable_env_checker=True, **kwargs, **kind)

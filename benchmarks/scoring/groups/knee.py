@@ -54,6 +54,7 @@ walk has 1.14, by A 1.66, by B 0.77; on stairs, where the knee asks for more tha
 all three fall below 1."""
 _SATURATED: Column = ("saturated_time", "true pressure at capacity [%]", 100.0)
 GAIT_COLUMNS: tuple[Column, ...] = (
+    ("emg_effort", "EMG effort", 1.0),
     RMS_PERCENT,
     ("angle_rms", "swing: angle RMS [deg]", DEGREES),
     ("switch_error", "error at the switch [N]", 1.0),
@@ -61,7 +62,6 @@ GAIT_COLUMNS: tuple[Column, ...] = (
     ("pressure_jump", "jump of pressure [bar]", 1e-5),
     ("torque_rms", "assistance RMS, as desired [N m]", 1.0),
     ("torque_ideal_rms", "of the true demand [N m]", 1.0),
-    ("emg_effort", "EMG effort", 1.0),
     ("emg_ratio", "without what flexors save", 1.0),
     ("emg_extensors_ratio", "of extensors", 1.0),
     ("emg_flexors_ratio", "of flexors", 1.0),

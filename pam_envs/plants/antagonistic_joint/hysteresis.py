@@ -7,13 +7,13 @@ together, in one of two ways:
     length:    F = F(p, e) - width (base + rate p0) lag(e),   limits in proportion to base + rate p
     pressure:  F = F(p, e) - width (base + rate p) lag(e)
 
-Both slip at a force in proportion to ``base + rate p``. In the first, elements of constant stiffness
-slip at a distance that grows with pressure, which is passive; ``p0 = REFERENCE_PRESSURE``. In the
-second the pressure changes the force of friction that is stuck, and so creates or destroys energy.
-That force also opposes a change of the command, which reduces the joint's gain after a turn; the
-presets driven by length have stiffer elements that slip at a smaller force, so that both forms have
-the same loops and the same gain after a turn. With plays, the lag is a sum of Maxwell-slip elements.
-The contraction is counted from that of the straight joint, at which a virgin hysteresis is at rest.
+Both slip at a force in proportion to ``base + rate p``. In the first, elements of constant
+stiffness slip at a distance that grows with pressure, which is passive; ``p0`` is
+``REFERENCE_PRESSURE``. In the second the pressure changes the force of friction that is stuck, and
+so creates or destroys energy. That force also opposes a change of the command, which reduces the
+joint's gain after a turn; the presets driven by length have stiffer elements that slip at a smaller
+force, so that both forms have the same loops and the same gain after a turn. With plays, the lag is
+a sum of Maxwell-slip elements. The contraction is counted from that of the straight joint, at which a virgin hysteresis is at rest.
 """
 
 from __future__ import annotations

@@ -89,14 +89,13 @@ class AntagonisticJoint(PairPlant, rows=K):
     # --- presets --------------------------------------------------------------------------------
 
     @classmethod
-    def paper(cls, hysteresis: str = "maxwell_slip_length", **changes: float) -> AntagonisticJoint:
+    def paper(cls, hysteresis: str = "maxwell_slip", **changes: float) -> AntagonisticJoint:
         """Return the joint whose muscles end at 25 % contraction, as fluidic_muscles has it.
 
         Parameters
         ----------
-        hysteresis : {"maxwell_slip_length", "preisach_length", "none"}
-            Kind of the hysteresis: driven by length as here, or ``"maxwell_slip"`` and
-            ``"preisach"``, driven by pressure. All have the same loops at one pressure.
+        hysteresis : {"maxwell_slip", "preisach", "none"}
+            Hysteresis model; both operators have the same loops.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``hysteresis__width=0.5``).
         """
@@ -108,9 +107,7 @@ class AntagonisticJoint(PairPlant, rows=K):
         return plant.changed(changes)
 
     @classmethod
-    def measured(
-        cls, hysteresis: str = "maxwell_slip_length", **changes: float
-    ) -> AntagonisticJoint:
+    def measured(cls, hysteresis: str = "maxwell_slip", **changes: float) -> AntagonisticJoint:
         """Return the joint with muscles as measured, limited to the angle that it reaches.
 
         The limit is the angle that full pressure reaches at the nominal co-contraction, against

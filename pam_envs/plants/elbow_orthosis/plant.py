@@ -126,18 +126,14 @@ class ElbowOrthosis(Plant, rows=K):
 
     @classmethod
     def paper(
-        cls,
-        hysteresis: str = "maxwell_slip_length",
-        valves: Valves = "proportional",
-        **changes: float,
+        cls, hysteresis: str = "maxwell_slip", valves: Valves = "proportional", **changes: float
     ) -> ElbowOrthosis:
         """Return the orthosis with three and seven muscles on a pulley of 31.5 mm.
 
         Parameters
         ----------
-        hysteresis : {"maxwell_slip_length", "preisach_length", "none"}
-            Kind of the hysteresis: driven by length as here, or ``"maxwell_slip"`` and
-            ``"preisach"``, driven by pressure. All have the same widest loop at one pressure.
+        hysteresis : {"maxwell_slip", "preisach", "none"}
+            Hysteresis model; the two models differ but have the same widest loop.
         valves : {"proportional", "on_off"}
             See the class.
         **changes : float

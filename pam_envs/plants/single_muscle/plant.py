@@ -85,15 +85,14 @@ class SingleMuscle(Plant, rows=R):
         )
 
     @classmethod
-    def mas10(cls, hysteresis: str = "maxwell_slip_length", **changes: float) -> SingleMuscle:
+    def mas10(cls, hysteresis: str = "maxwell_slip", **changes: float) -> SingleMuscle:
         """Return the muscle identified on the measured tables, with that hysteresis.
 
         Parameters
         ----------
-        hysteresis : {"maxwell_slip_length", "preisach_length", "none"}
-            Kind of the hysteresis: driven by length as here, and so passive, or
-            ``"maxwell_slip"`` and ``"preisach"``, driven by pressure. Each was identified on the
-            same data.
+        hysteresis : {"maxwell_slip", "preisach", "none"}
+            Hysteresis model; each was identified on the same data. Driven by length, and so
+            passive: ``"maxwell_slip_length"`` and ``"preisach_length"``.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``mass__load=4.55``).
         """
