@@ -13,7 +13,8 @@ stiffness slip at a distance that grows with pressure, which is passive; ``p0`` 
 so creates or destroys energy. That force also opposes a change of the command, which reduces the
 joint's gain after a turn; the presets driven by length have stiffer elements that slip at a smaller
 force, so that both forms have the same loops and the same gain after a turn. With plays, the lag is
-a sum of Maxwell-slip elements. The contraction is counted from that of the straight joint, at which a virgin hysteresis is at rest.
+a sum of Maxwell-slip elements. The contraction is counted from that of the straight joint, at which
+a virgin hysteresis is at rest.
 """
 
 from __future__ import annotations
