@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
 from baselines.core.catalogue import make_controller
 from benchmarks.board.format import table
+from benchmarks.runs import rows
 from benchmarks.runs.rollout import Episode, run
 from benchmarks.scoring.groups.knee import effort_ratio
 from pam_envs.envs.knee.gait import PACES
@@ -19,7 +21,7 @@ COLUMNS = (
     "gait",
     "none",
     "perfect",
-    "perfect, of the true demand",
+    "perfect, true demand",
     "vented",
     "random",
     "x scatter",
@@ -72,3 +74,45 @@ def efforts(seeds: int, wearer: str = "prescribed") -> str:
             cells = (f"{np.mean(g):.3f} ± {np.std(g, ddof=1):.3f}" for g in groups)
             lines.append([f"{name}, {pace} pace", "1", *cells, f"{gain:.1f}"])
     return "\n".join(table(COLUMNS, lines))
+
+
+TRACKS = ("knee_walk_nominal", "knee_stairs_up_nominal", "knee_stairs_down_nominal")
+
+
+def pareto_figure() -> Any:
+    """Return RMS tracking error against effort of the rows of the gaits' nominal tracks.
+
+    Points are means over public episodes; the line joins those that no other dominates.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10.5, 4.0), layout="constrained")
+    for ax, track in zip(figure.subplots(1, 3), TRACKS, strict=True):
+        found = [row for row in rows.load_all() if row["row"].startswith(f"{track}--")]
+        points = [
+            tuple(
+                float(np.mean(rows.scores_of(rows.episodes_of(row), metric)))
+                for metric in ("rms_error", "emg_effort")
+            )
+            for row in found
+        ]
+        best = []
+        for (error, effort), row in sorted(zip(points, found, strict=True), key=lambda p: p[0]):
+            front = not best or effort < best[-1][1]
+            if front:
+                best.append((error, effort))
+            ax.plot(error, effort, "o", color="C0" if front else "0.6", markersize=5)
+            if front or row["controller"]["name"] in (VENTED, RANDOM):
+                name = row["controller"]["name"].removeprefix("knee_")
+                ax.annotate(
+                    name, (error, effort), fontsize=7, xytext=(4, 3), textcoords="offset points"
+                )
+        ax.plot(*zip(*best, strict=True), color="C0", linewidth=0.8)
+        ax.axhline(1.0, color="0.3", linewidth=0.8, linestyle=":")
+        ax.set_xscale("log")
+        ax.margins(x=0.2, y=0.1)
+        ax.set_title(track.removeprefix("knee_").removesuffix("_nominal").replace("_", " "))
+        ax.set_xlabel("RMS tracking error [N]")
+        ax.spines[["top", "right"]].set_visible(False)
+    figure.axes[0].set_ylabel("EMG effort (1: without the orthosis)")
+    return figure

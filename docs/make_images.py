@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from baselines.core.catalogue import make_controller  # noqa: E402
+from benchmarks.effort import pareto_figure  # noqa: E402
 from benchmarks.energy import isobaric_figure  # noqa: E402
 from benchmarks.papers import elbow as papers_elbow  # noqa: E402
 from benchmarks.papers import knee_studies, plots  # noqa: E402
@@ -85,4 +86,5 @@ if __name__ == "__main__":
     frame("PAM/RedundantManipulator-v0", arm, 4.2, reference="path_3")
     stride(images / "knee_stride.png")
     isobaric_figure().savefig(images / "isobaric_loops.png", dpi=90)
+    pareto_figure().savefig(images / "effort_pareto.png", dpi=100)
     plots.step_figure().savefig(images / "joint_step.png", dpi=100)

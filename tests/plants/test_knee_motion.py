@@ -5,10 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import pam_envs  # noqa: F401  registers the ids
 from pam_envs.constants import GRAVITY
 from pam_envs.kernels.build import COMPILED
 from pam_envs.muscle.emg import MuscleActivation, emg_proxy
@@ -303,3 +305,78 @@ def test_activations_equal_the_emg_proxy() -> None:
         ("flexors_free", proxy.flexors_free),
     ):
         assert np.allclose(made[name][settled], desired[settled], atol=1e-6)
+
+
+# --- strides that differ, and an adaptive wearer --------------------------------------------------
+
+
+def begins(phase: np.ndarray) -> np.ndarray:
+    """Return the times [s] at which strides begin."""
+    k = np.flatnonzero(np.diff(phase) < -0.5)
+    left = (1.0 - phase[k]) / (1.0 - phase[k] + phase[k + 1])
+    return PERIOD * (k + 1 + left)
+
+
+@slow
+def test_strides_differ_by_the_declared_share_and_smoothly() -> None:
+    env = gym.make("PAM/KneeWalk-v0", pace="normal", episode_seconds=180.0).unwrapped
+    plant = env.plant.without_noise()  # type: ignore[attr-defined]
+    env = gym.make("PAM/KneeWalk-v0", plant=plant, episode_seconds=180.0).unwrapped
+    _, info = env.reset(seed=3)
+    seen = [info]
+    while not info.get("truncated", False) and len(seen) < 17_000:
+        seen.append(env.step(np.array([-1.0], np.float32))[4])
+    phase, force = (
+        np.array([row[f"state/{k}"] for row in seen]) for k in ("phase", "ground_force")
+    )
+    durations = np.diff(begins(phase))
+    assert len(durations) > 120
+    assert durations.mean() == pytest.approx(plant.stride.time, rel=0.005)
+    assert durations.std() / durations.mean() == pytest.approx(0.03, abs=0.006)
+    peaks = [f.max() for f in np.split(force, np.flatnonzero(np.diff(phase) < -0.5) + 1)[1:-1]]
+    assert 0.01 < np.std(peaks) / np.mean(peaks) < 0.03
+    turns = np.unwrap(2.0 * np.pi * phase) / (2.0 * np.pi)
+    assert np.abs(np.diff(turns, 2)).max() < 6e-5  # a jump of the pace by 3 % would be 2.5e-4
+
+
+def worn(**changes: float) -> KneeOrthosis:
+    learning = {"leg__adaptation": 0.3, "leg__forgetting": 0.05, "leg__reflex": 15.0}
+    return KneeOrthosis.on_leg("walk", 2.0, "none", **(learning | changes))
+
+
+def efforts(plant: KneeOrthosis, set_points: np.ndarray) -> np.ndarray:
+    """Return the effort of each stride over that without the orthosis."""
+    made, n = simulate_knee(plant, set_points), round(plant.stride.time / PERIOD)
+    both = [
+        np.sqrt(np.mean((made[a] + made[b]).reshape(-1, n) ** 2, axis=1))
+        for a, b in (("quads", "flexors"), ("quads_free", "flexors_free"))
+    ]
+    return both[0] / both[1]
+
+
+@slow
+def test_adaptive_wearer_gives_up_effort_over_strides() -> None:
+    """First order in strides; a wearer who gives up all of it at once has less."""
+    set_points = np.full(12 * 200, 1.2e5)
+    learns, knows = (efforts(worn(leg__adaptation=a), set_points) for a in (0.3, 0.0))
+    assert np.all(np.diff(learns[:7]) < 0.0) and learns[0] - learns[6] > 0.02
+    gaps = learns[1:4] - learns[7]
+    assert np.all((gaps[1:] / gaps[:-1] > 0.3) & (gaps[1:] / gaps[:-1] < 0.7))
+    assert np.ptp(learns[7:]) < 2e-3 and np.ptp(knows[1:]) < 1e-6
+    assert learns[-1] > knows[-1]
+
+
+@slow
+def test_adaptive_wearer_takes_over_after_the_assistance_is_withdrawn() -> None:
+    set_points = np.repeat([1.5e5, 0.0], 15 * 200)
+    effort, alone = efforts(worn(), set_points), efforts(worn(), np.zeros(15 * 200))
+    assert effort[15] > alone[-1] + 0.02
+    assert effort[-1] == pytest.approx(alone[-1], abs=0.005)
+
+
+def test_prescribed_wearer_learns_nothing() -> None:
+    set_points = steps(300)
+    plain, other = (
+        simulate_knee(worn(leg__adaptation=0.0, leg__reflex=r), set_points) for r in (0.0, 15.0)
+    )
+    assert np.array_equal(plain["quads"], other["quads"])

@@ -14,12 +14,15 @@ from pam_envs.references.gait import (
     FOLDER,
     KNEE,
     NATURAL_STRIDE,
+    PAPER_STRIDE,
     SIGNALS,
     curve,
     curve_and_rates,
     fraction_of_turn,
     gait_curves,
     gait_table,
+    shared_load,
+    vertical_load,
 )
 
 PHASES = np.arange(100) / 100
@@ -69,6 +72,23 @@ def test_ground_force_is_never_negative_and_zero_in_swing(activity: str) -> None
     assert vertical.min() >= 0.0
     assert 0.25 < np.mean(vertical == 0.0) < 0.45
     assert 1.0 < vertical.max() < 1.5
+
+
+@pytest.mark.parametrize("activity", ACTIVITIES)
+@pytest.mark.parametrize("stride", [NATURAL_STRIDE, 2.5, PAPER_STRIDE])
+def test_centre_of_mass_moves_as_far_at_every_pace(activity: str, stride: float) -> None:
+    """Twice integrated vertical force of both legs: at most 5 cm up and down."""
+    phases, quick = np.arange(2000) / 2000, NATURAL_STRIDE / stride
+    one, other = (gait_curves(activity, phases + shift)["ground_z"] for shift in (0.0, 0.5))
+    both = shared_load(one, other, quick) + shared_load(other, one, quick)  # type: ignore[arg-type]
+    travel = GRAVITY * (both - both.mean())
+    for _ in range(2):
+        travel = np.cumsum(travel) * stride / 2000
+        travel -= travel.mean()
+    assert 0.015 < np.ptp(travel) < 0.05
+    table = gait_table(activity)
+    own = [vertical_load(table, phase, quick) for phase in phases[::100]]
+    assert own == pytest.approx(shared_load(one, other, quick)[::100])  # type: ignore[arg-type]
 
 
 def test_gait_tables_equal_their_script() -> None:

@@ -74,6 +74,7 @@ def test_perfect_record_has_no_error_and_the_constructed_ratios() -> None:
         assert scores[name] == 0.0
     assert scores["torque_ideal_rms"] == pytest.approx(2.0)
     assert scores["emg_extensors_ratio"] == pytest.approx(0.8)
+    assert scores["emg_effort"] == pytest.approx(1.4)  # 0.8 and 2 of 1 and 1
     assert scores["emg_ratio"] == pytest.approx(1.8)  # the flexors' 2 less 1 on top
     assert scores["emg_extensors_ratio_fitted_a"] <= scores["emg_ratio_fitted_a"]
     assert scores["emg_flexors_ratio"] == pytest.approx(2.0)
