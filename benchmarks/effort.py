@@ -96,7 +96,7 @@ def pareto_figure() -> Any:
             )
             for row in found
         ]
-        best = []
+        best: list[tuple[float, ...]] = []
         for (error, effort), row in sorted(zip(points, found, strict=True), key=lambda p: p[0]):
             front = not best or effort < best[-1][1]
             if front:
