@@ -104,8 +104,9 @@ def pareto_figure() -> Any:
             ax.plot(error, effort, "o", color="C0" if front else "0.6", markersize=5)
             if front or row["controller"]["name"] in (VENTED, RANDOM):
                 name = row["controller"]["name"].removeprefix("knee_")
+                place = (4, 5) if len(best) % 2 else (4, -10)
                 ax.annotate(
-                    name, (error, effort), fontsize=7, xytext=(4, 3), textcoords="offset points"
+                    name, (error, effort), fontsize=7, xytext=place, textcoords="offset points"
                 )
         ax.plot(*zip(*best, strict=True), color="C0", linewidth=0.8)
         ax.axhline(1.0, color="0.3", linewidth=0.8, linestyle=":")

@@ -341,7 +341,11 @@ def test_strides_differ_by_the_declared_share_and_smoothly() -> None:
 
 
 def worn(**changes: float) -> KneeOrthosis:
-    learning: dict[str, Any] = {"leg__adaptation": 0.3, "leg__forgetting": 0.05, "leg__reflex": 15.0}
+    learning: dict[str, Any] = {
+        "leg__adaptation": 0.3,
+        "leg__forgetting": 0.05,
+        "leg__reflex": 15.0,
+    }
     return KneeOrthosis.on_leg("walk", 2.0, "none", **(learning | changes))
 
 
