@@ -10,7 +10,7 @@ from benchmarks.runs.verify import void
 
 CHEAP = {
     "positioning_disturbed": ("inverse_pid", "pid_tuned", "table"),
-    "knee_walk_nominal": ("knee_inverse", "knee_hold", "ppo_knee_walk"),
+    "knee_walk_nominal": ("knee_inverse", "knee_hold", "knee_ltr"),
     "elbow_valves": ("elbow_allocation_early_tuned", "elbow_pid"),
     "joint_payload": ("joint_inverse_ahead", "joint_pid"),
     "manipulator_payload": ("joint_inverse_kinematics", "joint_pi"),
