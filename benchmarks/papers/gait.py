@@ -168,10 +168,11 @@ def _estimator_errors(stride: float) -> Iterator[Figure]:
     title = f"error of Eq. (1), {stride:g} s a stride, "
     for flat, sensed in enumerate(LEANS):
         judged = stride == PAPER_STRIDE and not flat
-        more = (f"our target, the paper gives none; {LATE}",) if judged else ()
+        more = ("our target, the paper gives none",) if judged else ()
         most, text = MOST_ERROR if judged else None, note(*tag, why, *more)
         error = estimator_error(stride, flat)
-        yield torque(f"{title}lean from {sensed}", error, note=text, at_most=most)
+        late = LATE if judged else ""
+        yield torque(f"{title}lean from {sensed}", error, note=text, at_most=most, why=late)
     for added in ((LEFT_OUT[0],), (LEFT_OUT[1],), LEFT_OUT):
         name = f"{title}with the {' and the '.join(added)}"
         yield torque(name, estimator_error(stride, added=added), note=note(*tag))

@@ -8,17 +8,19 @@ from typing import Any
 
 BEFORE = "not in the paper: computed independently by another program"
 UNKNOWN = float("nan")
-"""Published value of a figure that the paper does not print."""
+"""Printed value of a figure that the paper does not print."""
+NEAR = 0.05
+"""Largest difference, over the printed value, of a figure without a tolerance of its own."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A published figure compared with ours, which is ``None`` if it could not be computed.
+    """A figure of a paper compared with ours, which is ``None`` if it could not be computed.
 
-    ``published`` is the paper's number, ``expected`` the result of an independent program from its
-    equations. ``tolerance`` is the largest accepted difference from ``expected``, or from
-    ``published`` without it. A ``given`` figure is an input, shown but not judged. ``why`` is the
-    reason of a known miss.
+    ``published`` is the number that the paper prints, and decides where there is one. ``expected``
+    is the result of an independent program from the paper's equations. ``tolerance`` is the largest
+    accepted difference, to either side. ``at_least`` and ``at_most`` are targets of this package. A
+    ``given`` figure is an input, shown but not judged. ``why`` is the reason of a known difference.
     """
 
     name: str
@@ -35,13 +37,19 @@ class Figure:
     why: str = ""
 
     @property
+    def printed(self) -> float | None:
+        """The number that the paper prints, if it does."""
+        return None if self.published != self.published else self.published
+
+    @property
     def passed(self) -> bool | None:
-        """True if ours is within tolerance and bounds; ``None`` if it is not judged."""
+        """True if ours is within tolerance and bounds; ``None`` if it has neither."""
         if self.ours is None or self.given:
             return None
         checks = list[bool]()
         if self.tolerance is not None:
-            target = self.published if self.expected is None else self.expected
+            target = self.expected if self.printed is None else self.printed
+            assert target is not None, f"{self.name}: a tolerance of nothing"
             checks.append(abs(self.ours - target) <= self.tolerance)
         if self.at_most is not None:
             checks.append(self.ours <= self.at_most)
@@ -50,7 +58,7 @@ class Figure:
         return all(checks) if checks else None
 
     @property
-    def judged_by(self) -> str:
+    def target(self) -> str:
         """The tolerance and the bounds, as the table shows them."""
         if self.given:
             return ""
@@ -61,18 +69,21 @@ class Figure:
 
     @property
     def verdict(self) -> str:
-        """Verdict of the table."""
+        """Against the paper where it prints a number, else against our target."""
         if self.ours is None:
             return "not computed"
         if self.given:
             return "input"
-        missed = "MISSED" if self.tolerance is None or self.why else "FAIL"
-        return {True: "pass", False: missed, None: "reported"}[self.passed]
+        if self.printed is not None:
+            near = abs(self.ours - self.printed) <= NEAR * abs(self.printed)
+            good = near if self.passed is None else self.passed
+            return "reproduced" if good else "differs"
+        return {True: "target met", False: "target missed", None: "not printed"}[self.passed]
 
     @property
     def remark(self) -> str:
         """The note, followed by the reason of a miss."""
-        reason = f"does not reproduce: {self.why}" if self.passed is False and self.why else ""
+        reason = self.why if self.passed is False else ""
         return "; ".join(text for text in (self.note, reason) if text)
 
     def record(self) -> dict[str, Any]:
@@ -101,11 +112,10 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
 def table(figures: Sequence[Figure]) -> str:
     """Return the figures as aligned text."""
     lines: list[tuple[str, ...]] = [
-        ("figure", "published", "expected", "ours", "unit", "judged by", "", "note")
+        ("figure", "printed", "recomputed", "target", "ours", "unit", "verdict", "where", "reason")
     ]
     for f in figures:
-        values = (None if f.published != f.published else f.published, f.expected)
-        known = ["" if value is None else f"{value:.4g}" for value in values]
+        known = ["" if value is None else f"{value:.4g}" for value in (f.printed, f.expected)]
         ours = "-" if f.ours is None else f"{f.ours:.4g}"
-        lines.append((f.name, *known, ours, f.unit, f.judged_by, f.verdict, f.remark))
+        lines.append((f.name, *known, f.target, ours, f.unit, f.verdict, f.source, f.remark))
     return aligned(lines)
