@@ -1,7 +1,5 @@
 """``python -m agents``: train, search, evaluate and enter policies."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys
@@ -48,16 +46,11 @@ def train(
 ) -> None:
     """Train a policy and export it as ONNX.
 
-    Parameters
-    ----------
-    seed
-        Seed of weights, exploration and episodes; default: 0.
-    out
-        Folder of the run; default: runs/ENV/ALGO-seedSEED.
-    resume
-        Continue the run in that folder with its settings; only --steps may change.
-    config
-        YAML file, or policy.onnx, whose settings replace the preset.
+    Args:
+        seed: Seed of weights, exploration and episodes; default: 0.
+        out: Folder of the run; default: runs/ENV/ALGO-seedSEED.
+        resume: Continue the run in that folder with its settings; only --steps may change.
+        config: YAML file, or policy.onnx, whose settings replace the preset.
     """
     from agents.training import sweep as sweeping
     from agents.training import train as training
@@ -135,22 +128,14 @@ def sweep(
 
     Exit code 0 if every policy exists, 1 if one is missing.
 
-    Parameters
-    ----------
-    seeds
-        Number of training seeds.
-    first_seed
-        The first training seed.
-    jobs
-        Parallel trainings on this machine.
-    backend
-        Processes of this machine, or a running Dask cluster.
-    address
-        Address of the Dask scheduler, for example tcp://host:8786.
-    out
-        Folder of the runs.
-    dry_run
-        List the trainings and whether their policies exist, and stop.
+    Args:
+        seeds: Number of training seeds.
+        first_seed: The first training seed.
+        jobs: Parallel trainings on this machine.
+        backend: Processes of this machine, or a running Dask cluster.
+        address: Address of the Dask scheduler, for example tcp://host:8786.
+        out: Folder of the runs.
+        dry_run: List the trainings and whether their policies exist, and stop.
     """
     from agents.training import sweep as sweeping
     from sweeps.engine import Cluster
@@ -188,12 +173,9 @@ def enter(
 
     The runs are training seeds 0 to n - 1 of one preset, and replace its older files.
 
-    Parameters
-    ----------
-    runs
-        Folders of the runs, each with policy.onnx and policy.json.
-    author
-        Author of the policies in BibTeX form; default: the authors of this package.
+    Args:
+        runs: Folders of the runs, each with policy.onnx and policy.json.
+        author: Author of the policies in BibTeX form; default: the authors of this package.
     """
     from agents.policies.entering import enter as copy
 
@@ -251,16 +233,11 @@ def tune(
 
     Each trial is two trainings of --steps control periods.
 
-    Parameters
-    ----------
-    trials
-        Number of settings to try, including those in the storage.
-    seed
-        Seed of the search.
-    storage
-        SQLite file; default: runs/tune/ENV.ALGO.db. Several processes may share it.
-    write
-        Write the best settings and the budget into the preset's file.
+    Args:
+        trials: Number of settings to try, including those in the storage.
+        seed: Seed of the search.
+        storage: SQLite file; default: runs/tune/ENV.ALGO.db. Several processes may share it.
+        write: Write the best settings and the budget into the preset's file.
     """
     from agents.search import tune as tuning
 

@@ -1,22 +1,12 @@
 """Exit codes of the command lines, and one-sentence errors."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable
 
 
 def run_cli(command: Callable[[], int | None], interrupted: str) -> int:
-    """Run a command and return its exit code; an error of the user is one sentence.
-
-    Parameters
-    ----------
-    command : callable
-        Returns the exit code, or None for 0.
-    interrupted : str
-        Message after Ctrl-C.
-    """
+    """Run a command and return its exit code, 0 for None; an error of the user is one sentence."""
     try:
         status = command()
         sys.stdout.flush()

@@ -4,8 +4,6 @@ This uses Dask's own client. Its joblib backend waits forever for a task whose w
 or cannot import the task's code (joblib 1.6).
 """
 
-from __future__ import annotations
-
 import sys
 from asyncio import CancelledError
 from collections.abc import Iterator, Mapping
@@ -17,11 +15,9 @@ from distributed.scheduler import KilledWorker
 
 from sweeps.worker import Act, Done, Task, do_in_cluster
 
-SECONDS = 10.0
-"""Timeout of the first connection."""
+SECONDS = 10.0  # timeout of the first connection
 
-LOOK = 5.0
-"""Seconds without a result after which the number of workers is checked."""
+LOOK = 5.0  # seconds without a result after which the number of workers is checked
 
 
 def run(act: Act, tasks: Mapping[str, Task], address: str) -> Iterator[Done]:
@@ -29,12 +25,7 @@ def run(act: Act, tasks: Mapping[str, Task], address: str) -> Iterator[Done]:
 
     Dask assigns the tasks of a lost worker to others, and abandons a task after several workers
     died while executing it. Each of several abandoned tasks is repeated alone, since only one of
-    them may be the cause.
-
-    Raises
-    ------
-    ValueError
-        If no scheduler answers, or the connection to it is lost.
+    them may be the cause. A ValueError says that no scheduler answers, or that it is lost.
     """
     with _client(address) as client:
         workers = _Workers(client, address)
@@ -95,7 +86,8 @@ def _round(
         try:
             found.put(await future)
         except (Exception, CancelledError) as error:
-            found.put(_failed(key, error) if future.status == "error" else None)
+            done = Done(key, error=_sentence(error), lost=isinstance(error, KilledWorker))
+            found.put(done if future.status == "error" else None)
 
     loop = client.loop
     assert loop is not None  # the client is connected
@@ -119,10 +111,6 @@ def _next(found: SimpleQueue[Done | None], workers: _Workers) -> Done | None:
         else:
             workers.reported = False
             return done
-
-
-def _failed(key: str, error: BaseException) -> Done:
-    return Done(key, error=_sentence(error), lost=isinstance(error, KilledWorker))
 
 
 def _sentence(error: BaseException) -> str:

@@ -10,16 +10,13 @@ The tasks in execution at that moment are then repeated, each alone, which ident
 kills its process every time. The remaining tasks continue in parallel.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from sweeps.worker import Act, Done, Task, do, end_with
 
-ATTEMPTS = 3
-"""Attempts at a task whose process dies."""
+ATTEMPTS = 3  # attempts at a task whose process dies
 
 
 def run_processes(act: Act, tasks: Mapping[str, Task], jobs: int) -> Iterator[Done]:
@@ -64,21 +61,11 @@ def _round(act: Act, tasks: Mapping[str, Task], jobs: int, started: list[str]) -
 
 @dataclass(frozen=True)
 class Cluster:
-    """Backend of the computation.
+    """Backend of the computation."""
 
-    Attributes
-    ----------
-    jobs : int
-        Processes of this machine; 1 computes in the calling process. Ignored by a Dask cluster.
-    backend : {"loky", "dask"}
-        Processes of this machine, or a running Dask cluster.
-    address : str
-        Of the Dask scheduler, for example ``tcp://host:8786``.
-    """
-
-    jobs: int = 1
-    backend: str = "loky"
-    address: str = ""
+    jobs: int = 1  # processes; 1 computes in the calling process; ignored by a Dask cluster
+    backend: str = "loky"  # "loky", processes of this machine, or "dask", a running cluster
+    address: str = ""  # of the Dask scheduler, for example tcp://host:8786
 
     def __post_init__(self) -> None:
         """Refuse contradictory arguments."""
@@ -94,19 +81,7 @@ class Cluster:
 
 
 def run(act: Act, tasks: Iterable[Task], cluster: Cluster) -> Iterator[Done]:
-    """Execute all tasks and yield their outcomes in order of completion.
-
-    An exception in ``act`` is the task's error. A task whose worker dies is repeated, and becomes
-    an error if its worker dies every time.
-
-    Parameters
-    ----------
-    act : callable
-        Executes one task.
-    tasks : iterable
-        With distinct keys.
-    cluster : Cluster
-    """
+    """Execute tasks with distinct keys; yield their outcomes, errors too, as they complete."""
     named = {task.key: task for task in tasks}
     if cluster.backend == "dask":
         from sweeps import dask_cluster

@@ -1,22 +1,12 @@
 """Progress of long tasks: a bar on a terminal, otherwise one line per minute."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
+from rich import progress as bars
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TextColumn,
-    TimeElapsedColumn,
-)
 from rich.text import Text
 
 LINE_SECONDS = 60.0
@@ -42,10 +32,10 @@ def left(elapsed: float | None, done: float, total: float | None) -> str:
     return f"about {seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02}"
 
 
-class _Left(ProgressColumn):
+class _Left(bars.ProgressColumn):
     """Remaining time; Rich's own column uses the last 30 s, too few for long tasks."""
 
-    def render(self, task: Task) -> Text:
+    def render(self, task: bars.Task) -> Text:
         before = task.fields["before"]
         total = None if task.total is None else task.total - before
         return Text(left(task.elapsed, task.completed - before, total) + task.fields["note"])
@@ -53,25 +43,17 @@ class _Left(ProgressColumn):
 
 @contextmanager
 def progress(title: str, console: Console | None = None) -> Iterator[Start]:
-    """Show the share done and the remaining time, and yield the function that starts the count.
-
-    Parameters
-    ----------
-    title : str
-        Name of the tasks, in the plural.
-    console : Console, optional
-        Standard error by default.
-    """
+    """Show share done and remaining time of tasks; yield the function that starts the count."""
     out = console or Console(stderr=True)
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn(),
+        bars.TimeElapsedColumn(),
+        bars.TextColumn("left"),
         _Left(),
     )
-    with Progress(*columns, console=out, disable=not out.is_terminal) as bar:
+    with bars.Progress(*columns, console=out, disable=not out.is_terminal) as bar:
 
         def start(total: int, done: int = 0) -> Advance:
             if not out.is_terminal:

@@ -1,7 +1,5 @@
 """Versions of Python and installed packages."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import platform
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Tasks, their outcomes, and their execution in a worker process."""
 
-from __future__ import annotations
-
 import os
 import sys
 import threading
@@ -26,27 +24,15 @@ Act = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Done:
-    """Outcome of a task.
-
-    Attributes
-    ----------
-    key : str
-    value : object
-        Return value of the function.
-    error : str, optional
-        Reason for a missing value.
-    lost : bool
-        Whether the reason is that its workers died.
-    """
+    """Outcome of a task."""
 
     key: str
-    value: Any = None
-    error: str | None = None
-    lost: bool = False
+    value: Any = None  # return value of the function
+    error: str | None = None  # reason for a missing value
+    lost: bool = False  # whether the reason is that its workers died
 
 
-LOOK = 0.25
-"""Seconds between two checks that the driver is alive."""
+LOOK = 0.25  # seconds between two checks that the driver is alive
 
 _one_at_a_time = threading.Lock()
 

@@ -1,7 +1,5 @@
 """Export of a trained model: its deterministic action as a graph of arithmetic in ONNX."""
 
-from __future__ import annotations
-
 import json
 import platform
 from collections.abc import Iterator, Mapping
@@ -45,30 +43,14 @@ def export_policy(
     card: Mapping[str, Any] | None = None,
     training: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Write the model's deterministic action as a policy file, and its training record beside it.
+    """Write the model's deterministic action as a policy file, and return its card.
 
-    Parameters
-    ----------
-    model : PPO, RecurrentPPO, SAC or TQC
-        With its environment (a :class:`agents.vec_envs.batch.BatchVecEnv`, wrapped or not), which
-        holds the signals and the observation's normaliser.
-    path : str or Path
-        ``policy.onnx``; the training record is written to ``policy.json``.
-    card : mapping, optional
-        Further entries of the card: seed, steps, command.
-    training : mapping, optional
-        Cost of the training (times, machine), which is no part of the policy.
-
-    Returns
-    -------
-    dict
-        The card.
-
-    Raises
-    ------
-    ValueError
-        If the model has layers that the export does not support, or corrects a controller that is
-        mostly saturated.
+    ``model`` is a PPO, RecurrentPPO, SAC or TQC with its environment (a
+    :class:`agents.vec_envs.batch.BatchVecEnv`, wrapped or not), which holds the signals and the
+    observation's normaliser. ``card`` are further entries of the card (seed, steps, command);
+    ``training``, its cost (times, machine), is written beside ``path``, into ``policy.json``. A
+    ValueError says that the model has layers that the export does not support, or corrects a
+    controller that is mostly saturated.
     """
     full = {**facts(model), **(card or {})}
     write_policy(Path(path), policy_bytes(model, full), {"training": dict(training or {})})

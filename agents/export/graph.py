@@ -7,8 +7,6 @@ The state of a policy is explicit: ``state`` is an input beside the observation,
 output, and the graph resets the state where ``start`` is 1, at the beginning of an episode.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

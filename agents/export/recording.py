@@ -1,7 +1,5 @@
 """Recorded actions, in tuning episodes, of the controller that a residual policy corrects."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,10 +12,8 @@ from agents.settings.schema import SettingsError
 from baselines.core.recorded_answers import Array, RecordedAnswers
 
 STEPS = 48
-EPISODES = 8
-"""Number of tuning episodes; the one with the largest travel is recorded."""
-MOST_AT_LIMIT = 0.1
-"""Largest share of saturated actions, which can hide a change of the controller."""
+EPISODES = 8  # number of tuning episodes; the one with the largest travel is recorded
+MOST_AT_LIMIT = 0.1  # largest share of saturated actions, which can hide a change of the controller
 
 
 def record(
@@ -25,20 +21,8 @@ def record(
 ) -> RecordedAnswers:
     """Return a controller's actions in the tuning episode with the largest travel.
 
-    Parameters
-    ----------
-    env : str
-        Id of the environment.
-    kinds : sequence of mapping
-        Arguments of the environment whose nominal plant the controller was built from.
-    controller : Controller
-    name : str
-        Of the controller, for the message.
-
-    Raises
-    ------
-    SettingsError
-        If the controller saturates too often in every episode.
+    ``kinds`` are arguments of the environment whose nominal plant the controller was built from. A
+    SettingsError with the controller's name says that it saturates too often in every episode.
     """
     found = [episode for kind in kinds for episode in _episodes(env, kind, controller)]
     if not found:
@@ -66,10 +50,7 @@ def _episodes(env: str, kind: Mapping[str, Any], controller: Any) -> list[Record
         observation, _, terminated, truncated, _ = made.step(action)
         over = bool((terminated | truncated).any())
     made.close()
-    rows = zip(np.stack(observations, 1), np.stack(actions, 1), strict=True)
-    episodes = [RecordedAnswers(*row) for row in rows]
-    return [episode for episode in episodes if _at_limit(episode, space) <= MOST_AT_LIMIT]
-
-
-def _at_limit(episode: RecordedAnswers, space: Any) -> float:
-    return float(((episode.answers <= space.low) | (episode.answers >= space.high)).mean())
+    answers = np.stack(actions, 1)
+    at_limit = ((answers <= space.low) | (answers >= space.high)).mean(axis=(1, 2))
+    rows = zip(np.stack(observations, 1), answers, at_limit, strict=True)
+    return [RecordedAnswers(seen, made) for seen, made, share in rows if share <= MOST_AT_LIMIT]

@@ -4,8 +4,6 @@ Each preset is an entry. Its policies, one a training seed, are compared togethe
 of a single seed is no evidence.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 from collections.abc import Mapping
@@ -32,24 +30,20 @@ BY_HAND = "by hand"
 
 @dataclass(frozen=True)
 class Entry:
-    """Policies of one preset.
+    """Policies of one preset."""
 
-    ``file`` is their name in ``agents/pretrained``, with ``{seed}`` for the training seed.
-    Knowledge is "nominal model" for a policy that was trained in simulation of it. A residual
-    corrects the controller ``baseline``; ``found`` are the knobs of that controller found by a
-    search. ``trials`` is the number of settings tried for the preset, including earlier searches
-    and those of a residual's controller, None if not counted; ``tuning`` says where they come from.
-    """
-
-    file: str
+    file: str  # name in agents/pretrained, with {seed} for the training seed
     summary: str
-    knowledge: str
+    knowledge: str  # "nominal model" for a policy that was trained in simulation of it
     citation: str
     envs: tuple[str, ...]
     kind: str = "learned"
-    baseline: str = ""
+    baseline: str = ""  # controller that a residual corrects
+    # settings tried for the preset, with earlier searches and those of a residual's controller;
+    # None if not counted
     trials: int | None = None
-    tuning: str = BY_HAND
+    tuning: str = BY_HAND  # origin of the settings
+    # knobs of the corrected controller found by a search
     found: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
@@ -118,8 +112,7 @@ KINDS: dict[str, Kind] = {
     "tqc": Kind("tqc", "TQC, two layers; no memory", TQC),
 }
 """By algorithm and variant, as in a file name; residuals and a user's presets are separate."""
-NAME = re.compile(r"[a-z0-9_]+")
-"""Valid names of controllers."""
+NAME = re.compile(r"[a-z0-9_]+")  # valid names of controllers
 HOW_TO_NAME = "name its file ENV.ALGO-VARIANT.yaml, the variant in small letters, digits and _"
 SUFFIXES: dict[str, str] = {
     "MusclePositioning-v0": "",
@@ -137,11 +130,7 @@ WHERE: dict[str, str] = {
 
 
 def offered() -> dict[str, Entry]:
-    """Return an entry for every preset.
-
-    A SettingsError names a preset whose environment or algorithm differs from its file name, or
-    whose controller's name is not valid or not unique.
-    """
+    """Return an entry for every preset; SettingsError for one whose names do not fit."""
     made: dict[str, Entry] = {}
     for (env_id, algo, variant), path in configs.presets().items():
         preset = f"{algo}-{variant}" if variant else algo
@@ -242,10 +231,7 @@ def check_files(entries: Mapping[str, Entry]) -> None:
 
 @functools.cache
 def outdated(name: str) -> bool:
-    """Return whether a policy was trained on plants that its environment no longer has.
-
-    Such a policy can be loaded, and is left out of benchmarks until it is trained again.
-    """
+    """Return whether a policy was trained on plants that its environment no longer has."""
     first = CONTROLLERS[name].first
     if first is None:
         return False
@@ -261,8 +247,7 @@ def outdated(name: str) -> bool:
     return not now & set(card["plants"])
 
 
-OFFERED: dict[str, Entry] = offered()
-"""All presets' entries, trained or not."""
+OFFERED: dict[str, Entry] = offered()  # all presets' entries, trained or not
 check_files(OFFERED)
 CONTROLLERS: dict[str, Entry] = {n: entry for n, entry in OFFERED.items() if entry.files()}
 """Entries with files."""
@@ -274,23 +259,12 @@ def load_pretrained(
     action_signals: Signals | None = None,
     training_seed: int | None = None,
 ) -> OnnxPolicy:
-    """Return a policy that comes with the project.
+    """Return a policy that comes with the project, by a key of :data:`CONTROLLERS`.
 
-    Parameters
-    ----------
-    name : str
-        A key of :data:`CONTROLLERS`.
-    signals, action_signals : Signals, optional
-        Of the environment; if given, they must equal those of the training.
-    training_seed : int, optional
-        Default: the lowest that exists.
-
-    Raises
-    ------
-    ValueError
-        If there is no such policy or training seed, the signals differ, or the card differs from
-        the
-        file name in environment, algorithm, training seed or controller.
+    The signals, if given, must equal those of the training; the default training seed is the lowest
+    that exists. A ValueError says that there is no such policy or training seed, that the signals
+    differ, or that the card differs from the file name in environment, algorithm, training seed or
+    controller.
     """
     if name not in CONTROLLERS:
         raise ValueError(f"no policy named {name!r}{near(name, CONTROLLERS)}")

@@ -1,7 +1,5 @@
 """Entry of finished runs into ``agents/pretrained``, as one set of training seeds of a preset."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple

@@ -5,8 +5,6 @@ express "the last setpoint plus a gain times the error" from the first step on, 
 the rest.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import torch

@@ -15,16 +15,7 @@ import numpy as np
 import onnxruntime  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from agents.policies.policy_file import (
-    AFTER,
-    CONTROLLER,
-    INPUT,
-    OUTPUT,
-    START,
-    STATE,
-    PolicyFileError,
-    read,
-)
+from agents.policies import policy_file as files
 from pam_envs.parameters import Signal, Signals
 
 FIELDS = tuple(field.name for field in dataclasses.fields(Signal))
@@ -42,16 +33,10 @@ class OnnxPolicy:
     not depend on the other rows of a batch, to the last bit. A policy that corrects a controller
     acts together with it: see :class:`agents.policies.residual.ResidualPolicy`.
 
-    Attributes
-    ----------
-    memory : int
-        Width of the state, of a recurrent layer or a history; 0 for none.
-    corrects : str
-        Name of the controller that it corrects; empty for none.
-    card : dict
-        Environment, signals, algorithm, steps, seed, versions and command of the training.
-    signals, action_signals : Signals
-        Of its input and output.
+    ``memory`` is the width of the state, of a recurrent layer or a history, 0 for none;
+    ``corrects`` the name of the controller that it corrects, empty for none; ``signals`` and
+    ``action_signals`` are those of input and output. The ``card`` has environment, signals,
+    algorithm, steps, seed, versions and command of the training.
     """
 
     def __init__(self, data: bytes, card: dict[str, Any], name: str = "the policy") -> None:
@@ -73,20 +58,11 @@ class OnnxPolicy:
     ) -> OnnxPolicy:
         """Return the policy in a file, for an environment with these signals.
 
-        Parameters
-        ----------
-        path : str or Path
-            An ONNX file of :func:`agents.export.export.export_policy`.
-        signals, action_signals : Signals, optional
-            Of the environment (``env.unwrapped.signals``); if given, they must equal those of the
-            training.
-
-        Raises
-        ------
-        PolicyFileError
-            If the file is refused (see :mod:`agents.policies.policy_file`) or the signals differ.
+        The signals (``env.unwrapped.signals``), if given, must equal those of the training; a
+        PolicyFileError says that they differ, or that the file is refused
+        (:mod:`agents.policies.policy_file`).
         """
-        file = read(path)
+        file = files.read(path)
         made = cls(file.data, file.card, Path(path).name)
         made.check(signals, action_signals)
         return made
@@ -107,27 +83,13 @@ class OnnxPolicy:
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[NDArray[np.float32], Any]:
-        """Return the action for an observation.
+        """Return the action for an observation, and the state for the next call.
 
-        Parameters
-        ----------
-        observation : array, shape (n_signals,) or (n_env, n_signals)
-        state : array, shape (1 or n_env, memory), optional
-            Returned by the last call; None begins an episode in every row. Ignored by a policy
-            without memory.
-        episode_start : bool or array, shape (n_env,), optional
-            Rows that begin an episode, whose state is reset.
-        deterministic : bool
-            Ignored: the file holds the deterministic action.
-
-        Returns
-        -------
-        array, shape (n_actions,) or (n_env, n_actions), and the state for the next call
-
-        Raises
-        ------
-        ValueError
-            If the observation has another shape, or the policy corrects a controller.
+        The observation has shape (n_signals,) or (n_env, n_signals), the action likewise. The state
+        (1 or n_env, memory) is that of the last call; None begins an episode in every row, and rows
+        with ``episode_start`` begin one. It is ignored by a policy without memory, as is
+        ``deterministic``: the file holds the deterministic action. A ValueError says that the
+        observation has another shape, or that the policy corrects a controller.
         """
         if self.corrects:
             raise ValueError(
@@ -143,10 +105,7 @@ class OnnxPolicy:
         episode_start: Any = None,
         controller: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], Any]:
-        """Return the corrected action, given the action of the controller.
-
-        The other parameters are those of :meth:`predict`.
-        """
+        """Return the corrected action, given that of the controller; see :meth:`predict`."""
         made = np.asarray(observation, np.float32)
         rows = made if made.ndim == 2 else made[None]
         if made.ndim not in (1, 2) or rows.shape[1] != len(self.signals):
@@ -154,14 +113,14 @@ class OnnxPolicy:
                 f"the observation has shape {made.shape}, expected ({len(self.signals)},) or "
                 f"(n_env, {len(self.signals)}): {', '.join(self.signals.names())}"
             )
-        fed = {INPUT: np.ascontiguousarray(rows)}
+        fed = {files.INPUT: np.ascontiguousarray(rows)}
         if controller is not None:
-            fed[CONTROLLER] = np.ascontiguousarray(controller).reshape(len(rows), -1)
+            fed[files.CONTROLLER] = np.ascontiguousarray(controller).reshape(len(rows), -1)
         if self.memory:
             fed |= self._state_inputs(state, episode_start, len(rows))
-            action, state = self._session.run([OUTPUT, AFTER], fed)
+            action, state = self._session.run([files.OUTPUT, files.AFTER], fed)
         else:
-            action = self._session.run([OUTPUT], fed)[0]
+            action = self._session.run([files.OUTPUT], fed)[0]
         return (action if made.ndim == 2 else action[0]), state
 
     def _state_inputs(self, state: Any, episode_start: Any, rows: int) -> dict[str, NDArray[Any]]:
@@ -169,7 +128,7 @@ class OnnxPolicy:
         starts = np.zeros((rows, 1), np.float32)
         if state is None:
             starts[:] = 1.0
-            return {STATE: np.zeros((rows, self.memory), np.float32), START: starts}
+            return {files.STATE: np.zeros((rows, self.memory), np.float32), files.START: starts}
         if episode_start is not None:
             starts[:, 0] = episode_start
         if np.shape(state) != (rows, self.memory):
@@ -177,7 +136,7 @@ class OnnxPolicy:
                 f"the state has shape {np.shape(state)}, expected ({rows}, {self.memory}); "
                 "give the state that the last call returned, or None to begin"
             )
-        return {STATE: state, START: starts}
+        return {files.STATE: state, files.START: starts}
 
     def digest(self) -> str:
         """Return the SHA-256 of the file, 16 hexadecimal digits."""
@@ -186,21 +145,21 @@ class OnnxPolicy:
     def _check_shapes(self) -> int:
         """Raise unless inputs and outputs are a policy's; return the width of its state."""
         actions = len(self.action_signals)
-        memory = _width(self._session.get_inputs(), STATE)
-        inputs = {INPUT: len(self.signals)}
-        outputs = {OUTPUT: actions}
+        memory = _width(self._session.get_inputs(), files.STATE)
+        inputs = {files.INPUT: len(self.signals)}
+        outputs = {files.OUTPUT: actions}
         if self.corrects:
-            inputs[CONTROLLER] = actions
+            inputs[files.CONTROLLER] = actions
         if memory:
-            inputs |= {STATE: memory, START: 1}
-            outputs[AFTER] = memory
+            inputs |= {files.STATE: memory, files.START: 1}
+            outputs[files.AFTER] = memory
         for expected, found in (
             (inputs, self._session.get_inputs()),
             (outputs, self._session.get_outputs()),
         ):
             shapes = {node.name: (node.type, node.shape[1:]) for node in found}
             if shapes != {name: ("tensor(float)", [width]) for name, width in expected.items()}:
-                raise PolicyFileError(
+                raise files.PolicyFileError(
                     f"{self.name} has {shapes}, but its card requires float32 numbers per row as "
                     f"follows: {expected}; export it with agents.export.export.export_policy"
                 )
@@ -217,7 +176,7 @@ def _corrects(card: dict[str, Any], name: str) -> str:
     try:
         return str(card["baseline"]["name"]) if "baseline" in card else ""
     except (TypeError, KeyError) as error:
-        raise PolicyFileError(
+        raise files.PolicyFileError(
             f"{name}: its card does not name the controller that it corrects"
         ) from error
 
@@ -230,14 +189,14 @@ def _session(data: bytes, name: str) -> onnxruntime.InferenceSession:
     try:
         return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except Exception as error:
-        raise PolicyFileError(f"{name} is no executable graph: {error}") from error
+        raise files.PolicyFileError(f"{name} is no executable graph: {error}") from error
 
 
 def _signals(described: Any, name: str) -> Signals:
     try:
         return Signals(Signal(**entry) for entry in described)
     except (TypeError, KeyError, ValueError) as error:
-        raise PolicyFileError(f"{name}: its card describes no signals ({error})") from error
+        raise files.PolicyFileError(f"{name}: its card describes no signals ({error})") from error
 
 
 def _equal(a: Any, b: Any) -> bool:
@@ -250,14 +209,14 @@ def _equal(a: Any, b: Any) -> bool:
 def _compare(mine: Signals, theirs: Signals, what: str) -> None:
     a, b = list(mine.names()), list(theirs.names())
     if a != b:
-        raise PolicyFileError(
+        raise files.PolicyFileError(
             f"{what}: trained with {', '.join(a)}, now {', '.join(b)}; make the "
             "environment with the arguments on the policy's card (env_kwargs)"
         )
     for trained, given in zip(mine, theirs, strict=True):
         for field in FIELDS:
             if not _equal(getattr(trained, field), getattr(given, field)):
-                raise PolicyFileError(
+                raise files.PolicyFileError(
                     f"{what}: {trained.name} had {field} = {getattr(trained, field)!r} in "
                     f"training, now {getattr(given, field)!r}; make the environment with the "
                     "arguments on the policy's card (env_kwargs)"

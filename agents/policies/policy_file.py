@@ -4,12 +4,9 @@ An ONNX file is data, a graph of arithmetic and its numbers. The checks refuse t
 graph could still do harm: weights in other files, operators of other vendors, loops, size.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,17 +15,15 @@ from typing import Any
 import onnx
 import onnx.shape_inference
 
-POLICY, RECORD = "policy.onnx", "policy.json"
-"""Files of a finished run."""
-TEMPORARY = ".tmp"
-"""Suffix of files that are being written."""
+from sweeps.files import write_bytes
+
+POLICY, RECORD = "policy.onnx", "policy.json"  # files of a finished run
 MOST_BYTES = 5_000_000
 MOST_NUMBERS = 100_000
 CARD = "pam_policy"
 SCHEMA = 1
 INPUT, OUTPUT = "observation", "action"
-CONTROLLER = "controller"
-"""Input of a policy that corrects a controller: the controller's action."""
+CONTROLLER = "controller"  # input of a policy that corrects a controller: the controller's action
 STATE, START, AFTER = "state", "start", "state_after"
 """Inputs and output of a policy with a state; ``start`` is 1 where an episode begins."""
 OPERATORS = frozenset(
@@ -85,8 +80,8 @@ def write_policy(path: Path, data: bytes, record: Mapping[str, Any]) -> None:
     """
     said = {**record, "sha256": hashlib.sha256(data).hexdigest()}
     text = json.dumps(said, indent=1, sort_keys=True) + "\n"
-    write_atomically(path.with_suffix(".json"), text.encode())
-    write_atomically(path, data)
+    write_bytes(path.with_suffix(".json"), text.encode())
+    write_bytes(path, data)
 
 
 def record_of(path: Path) -> dict[str, Any]:
@@ -107,21 +102,6 @@ def finished(path: str | Path) -> dict[str, Any] | None:
         return None
     same = record_of(path).get("sha256") == hashlib.sha256(file.data).hexdigest()
     return file.card if same else None
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Replace a file by ``data``: a reader finds the old bytes or the new ones, never a part."""
-    temporary = path.with_name(f"{path.name}.{os.getpid()}{TEMPORARY}")
-    with temporary.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
 
 
 def _refuse_code(name: str, data: bytes) -> None:

@@ -1,7 +1,5 @@
 """Residual policy and the controller that it corrects, combined into one controller."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -25,11 +23,7 @@ class ResidualState(NamedTuple):
 
 
 class ResidualPolicy:
-    """Controller with the action ``controller's action + scale * policy``, clipped to its range.
-
-    The controller, of :data:`baselines.core.catalogue.CONTROLLERS`, is built from the nominal
-    plant.
-    """
+    """Controller with the action ``controller's action + scale * policy``, clipped to its range."""
 
     def __init__(self, policy: OnnxPolicy, controller: Any) -> None:
         self.policy = policy

@@ -1,7 +1,5 @@
 """Search spaces of the settings, by algorithm, as Optuna's distributions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

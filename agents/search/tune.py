@@ -11,19 +11,23 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import io
 import json
 import statistics
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import optuna
 from optuna.samplers import TPESampler
 from optuna.storages import RDBStorage, RetryHeartbeatStaleTrialCallback
 from optuna.trial import TrialState
 from rich.console import Console
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedSeq
 from stable_baselines3.common.logger import Logger
 
-from agents.search import preset_text
 from agents.search.spaces import as_settings, common, from_settings, suggest, with_settings
 from agents.settings import presets as configs
 from agents.settings.parts import Search
@@ -36,38 +40,21 @@ from agents.training.evaluation import value_of
 HEARTBEAT = 60
 """Heartbeat interval of a trial [s]; a trial is repeated after three missed heartbeats."""
 RETRIES = 2
-REPORTS = 5
-"""Number of evaluations of a training before its end."""
+REPORTS = 5  # number of evaluations of a training before its end
 DONE = (TrialState.COMPLETE, TrialState.PRUNED)
-EARLIER = "earlier"
-"""Study attribute: number of trials of earlier searches that led to its preset."""
-TRAINING_SEEDS = (10_000, 10_001)
-"""Apart from those of reported policies."""
+EARLIER = "earlier"  # study attribute: number of trials of earlier searches that led to its preset
+TRAINING_SEEDS = (10_000, 10_001)  # apart from those of reported policies
 
 
 @dataclass(frozen=True)
 class Job:
-    """A hyper-parameter search.
+    """A hyper-parameter search."""
 
-    Attributes
-    ----------
-    config : Config
-        The initial preset.
-    trials : int
-        Number of settings to try, including those of earlier calls.
-    steps : int
-        Control periods of each training.
-    seed : int
-        Of the sampler.
-    storage : Path
-        SQLite file, which several processes may share.
-    """
-
-    config: Config
-    trials: int
-    steps: int
-    seed: int
-    storage: Path
+    config: Config  # the initial preset
+    trials: int  # number of settings to try, including those of earlier calls
+    steps: int  # control periods of each training
+    seed: int  # of the sampler
+    storage: Path  # SQLite file, which several processes may share
 
     @property
     def name(self) -> str:
@@ -89,13 +76,7 @@ class Job:
 
 
 def search(job: Job, console: Console) -> optuna.Study:
-    """Run trials until ``job.trials`` are finished; return the study.
-
-    Raises
-    ------
-    SettingsError
-        If the preset has no evaluation.
-    """
+    """Run trials until ``job.trials`` are finished; SettingsError without evaluations."""
     if not job.config.evaluation.episodes:
         raise SettingsError(
             "evaluation.episodes = 0: a search needs episodes on tuning seeds; set it above 0"
@@ -170,20 +151,7 @@ def _trained(config: Config, seed: int, reports: Reports) -> float:
 
 
 class Reports(PeriodicCallback):
-    """Report a trial's evaluations to Optuna, and stop a pruned trial.
-
-    Parameters
-    ----------
-    config : Config
-    trial : optuna.Trial
-    before : int
-        Control periods of the trial's trainings before this one.
-
-    Attributes
-    ----------
-    values : list of float
-        Values of the evaluations.
-    """
+    """Report a trial's evaluations to Optuna, and stop a pruned trial."""
 
     def __init__(self, config: Config, trial: optuna.Trial, before: int) -> None:
         super().__init__(max(config.steps // REPORTS, 1))
@@ -212,13 +180,7 @@ class Reports(PeriodicCallback):
 
 
 def write(job: Job, study: optuna.Study, path: Path) -> Config:
-    """Write the best settings and the budget into the preset's file; return the new preset.
-
-    Raises
-    ------
-    SettingsError
-        If the file cannot be edited; it is left unchanged.
-    """
+    """Write the best settings and the budget into the preset's file; return the new preset."""
     search_part = Search(
         trials=finished(study),
         earlier=study.user_attrs.get(EARLIER, 0),
@@ -230,10 +192,40 @@ def write(job: Job, study: optuna.Study, path: Path) -> Config:
     changes = as_settings(job.config, study.best_params)
     changes |= {f"search.{name}": value for name, value in vars(search_part).items()}
     preset = with_settings(job.config, changes)
-    text = preset_text.edited(path.read_text(encoding="utf-8"), changes)
+    text = edited(path.read_text(encoding="utf-8"), changes)
     if configs.from_text(text) != preset:
         raise SettingsError(
             f"{path.name} has a layout that this cannot edit; change it by hand: {changes}"
         )
     path.write_text(text, encoding="utf-8")
     return preset
+
+
+def edited(text: str, changes: Mapping[str, Any]) -> str:
+    """Return YAML text with values changed by ``"section.entry"`` or ``"entry"``; keep comments."""
+    file = YAML()
+    file.indent(mapping=2, sequence=4, offset=2)
+    file.width = 10**6
+    file.preserve_quotes = True
+    file.representer.add_representer(float, _float)
+    held = file.load(text)
+    for name, value in changes.items():
+        section, _, entry = name.rpartition(".")
+        part = held.setdefault(section, {}) if section else held
+        part[entry] = _on_one_line(value) if isinstance(value, (list, tuple)) else value
+    made = io.StringIO()
+    file.dump(held, made)
+    return made.getvalue()
+
+
+def _on_one_line(values: Any) -> CommentedSeq:
+    made = CommentedSeq(values)
+    made.fa.set_flow_style()
+    return made
+
+
+def _float(representer: Any, value: float) -> Any:
+    """Write floats with a decimal point, without which YAML 1.1 reads text."""
+    digits = repr(value)
+    text = digits.replace("e", ".0e") if "e" in digits and "." not in digits else digits
+    return representer.represent_scalar("tag:yaml.org,2002:float", text)

@@ -1,7 +1,5 @@
 """Parts of a training's settings, each with its bounds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -10,30 +8,22 @@ from agents.settings.schema import choice, number
 
 @dataclass(frozen=True)
 class Network:
-    """Network of the policy; ``hidden`` are widths of the layers of policy and critic alike.
-
-    Attributes
-    ----------
-    log_std_init : float
-        PPO: logarithm of the initial standard deviation of the action, in its range [-1, 1].
-    differences : tuple of str
-        ``"a - b"`` with names of inputs: fixed extra inputs ``gain * (a - b)``, which scale up a
-        tracking error of a few hundredths of the range. Inputs are the signals, a residual's
-        ``controller_<action>``, and ``<signal>@1`` for ``history`` one period ago.
-    linear : bool
-        PPO: a linear path from the inputs to the action beside the layers, as in structured
-        control nets (Srouji, Zhang, Salakhutdinov, ICML 2018).
-    hold : tuple of str
-        PPO with ``linear``: a signal for each action. The untrained policy returns its value, so
-        learning starts from "keep the last setpoint".
-    """
+    """Network of the policy; ``hidden`` are widths of the layers of policy and critic alike."""
 
     hidden: tuple[int, ...] = number((64, 64), 1, 4096)
     activation: str = choice("tanh", "tanh", "relu", "elu")
+    # PPO: logarithm of the initial standard deviation of the action, in its range [-1, 1]
     log_std_init: float = number(0.0, -10.0, 3.0)
+    # "a - b" with names of inputs: fixed extra inputs gain * (a - b), which scale up a tracking
+    # error of a few hundredths of the range; inputs are the signals, a residual's
+    # controller_<action>, and <signal>@1 for the history one period ago
     differences: tuple[str, ...] = ()
     gain: float = number(10.0, 0.0, 1e4)
+    # PPO: a linear path from the inputs to the action beside the layers, as in structured control
+    # nets (Srouji, Zhang, Salakhutdinov, ICML 2018)
     linear: bool = False
+    # PPO with linear: a signal for each action, whose value the untrained policy returns, so that
+    # learning starts from "keep the last setpoint"
     hold: tuple[str, ...] = ()
 
 
@@ -117,12 +107,9 @@ class TQC(_OffPolicy):
 
 @dataclass(frozen=True)
 class History:
-    """Past signals as inputs: with hysteresis a single observation is not the full state.
+    """Past signals as inputs: with hysteresis a single observation is not the full state."""
 
-    ``frames`` is the number of past control periods, 0 for none.
-    """
-
-    frames: int = number(0, 0, 256)
+    frames: int = number(0, 0, 256)  # past control periods, 0 for none
     signals: tuple[str, ...] = ()
 
 
@@ -153,45 +140,29 @@ class Plants:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Evaluation of the policy during training, on tuning seeds (:mod:`agents.settings.seeds`).
+    """Evaluation of the policy during training, on tuning seeds (:mod:`agents.settings.seeds`)."""
 
-    Attributes
-    ----------
-    interval : int
-        Control periods of training between evaluations; 0 for the first and the last only.
-    episodes : int
-        Episodes per evaluation, divided among the kinds of rows, on the same seeds. 0 for no
-        evaluation: then the last policy is exported, otherwise the best.
-    settle_seconds : float
-        Start [s] of each episode that is excluded.
-    gate : tuple of str
-        Entries of ``info`` that are all 1 at evaluated instants; none for all instants.
-    objective : {"rms", "geometric", "return"}
-        The error's RMS, the geometric mean of the kinds' RMS (which weights ratios), or the return,
-        for tasks with more than one error.
-    env_kwargs : dict
-        Arguments of the environment that differ from the training's.
-    """
-
+    # control periods of training between evaluations; 0 for the first and the last only
     interval: int = number(0, 0, 10**12)
+    # episodes per evaluation, divided among the kinds of rows, on the same seeds; 0 for no
+    # evaluation: then the last policy is exported, otherwise the best
     episodes: int = number(0, 0, 1000)
-    settle_seconds: float = number(2.0, 0.0, 1e4)
-    gate: tuple[str, ...] = ()
+    settle_seconds: float = number(2.0, 0.0, 1e4)  # start [s] of each episode that is excluded
+    gate: tuple[str, ...] = ()  # entries of info that are all 1 at evaluated instants
+    # the error's RMS, the geometric mean of the kinds' RMS (which weights ratios), or the return,
+    # for tasks with more than one error
     objective: str = choice("rms", "rms", "geometric", "return")
+    # arguments of the environment that differ from the training's
     env_kwargs: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Search:
-    """Budget of the search that chose the settings, for fair comparisons.
+    """Budget of the search that chose the settings, for fair comparisons."""
 
-    ``trials`` is the number of settings tried, None if they were set by hand and not counted;
-    ``earlier`` the number tried by the searches that it started from, ``steps`` the control periods
-    of each training of a trial, ``note`` the method.
-    """
-
+    # settings tried, None if they were set by hand and not counted
     trials: int | None = number(None, 0, 10**6)
-    earlier: int = number(0, 0, 10**6)
-    steps: int = number(0, 0, 10**12)
+    earlier: int = number(0, 0, 10**6)  # tried by the searches that it started from
+    steps: int = number(0, 0, 10**12)  # control periods of each training of a trial
     seed: int = number(0, 0, 2**31)
-    note: str = "by hand"
+    note: str = "by hand"  # method

@@ -191,10 +191,7 @@ def preset(env: str, algo: str, variant: str = "") -> Config:
 
 
 def read(path: str | Path) -> Config:
-    """Return the configuration in a YAML file.
-
-    A SettingsError says that it is no YAML mapping, or which setting is unknown or out of bounds.
-    """
+    """Return the configuration in a YAML file; a SettingsError names what is wrong in it."""
     path = Path(path)
     given = _mapping(path)
     try:

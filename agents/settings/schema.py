@@ -1,7 +1,5 @@
 """Checked settings: frozen dataclasses from mappings, with errors that name the remedy."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import types

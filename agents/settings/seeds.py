@@ -5,8 +5,6 @@ seeds from ``TUNING`` on. Scenarios use seeds below ``TUNING``, and each audit r
 Scored episodes are therefore used neither in training nor in the choice of settings.
 """
 
-from __future__ import annotations
-
 TUNING = 900_000
 MOST_TUNING = 1_000
 TRAINING = 1_000_000

@@ -1,7 +1,5 @@
 """Selection of the best evaluated policy of a training, for export instead of the last one."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,16 +13,13 @@ UNTRAINED = "no later evaluation was better than the untrained policy's"
 
 @dataclass
 class Best:
-    """Weights and normaliser at the best of the evaluations so far.
+    """Weights and normaliser at the best of the evaluations so far."""
 
-    ``steps`` are control periods of training at that evaluation, -1 before the first; ``value`` is
-    the criterion of the choice (:func:`agents.training.evaluation.value_of`), less is better;
-    ``moments`` are those of the observation's normaliser, empty without one.
-    """
-
-    steps: int = -1
+    steps: int = -1  # control periods of training at that evaluation, -1 before the first
+    # criterion of the choice (agents.training.evaluation.value_of), less is better
     value: float = math.inf
     weights: dict[str, torch.Tensor] = field(default_factory=dict)
+    # of the observation's normaliser, empty without one
     moments: dict[str, Any] = field(default_factory=dict)
 
     def offer(self, model: BaseAlgorithm, value: float) -> None:

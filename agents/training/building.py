@@ -1,7 +1,5 @@
 """Environment and untrained model of a run, from its settings."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from functools import partial
@@ -76,10 +74,7 @@ def warm_up_steps(config: Config) -> int:
 
 
 def learning_rate(config: Config) -> Callable[[float], float]:
-    """Return the learning rate as a function of the remaining share of the training.
-
-    A SettingsError says that the critic's warm-up lasts to the end.
-    """
+    """Return the learning rate as a function of the remaining share of the training."""
     start, end = config.chosen.learning_rate
     alone = warm_up_steps(config)
     if alone >= config.steps:

@@ -1,11 +1,11 @@
-"""Callbacks of a training: critic warm-up, evaluations, checkpoints, cancellation."""
-
-from __future__ import annotations
+"""Callbacks of a training: critic warm-up, evaluations, checkpoints, progress, cancellation."""
 
 import json
 import math
+import time
 from typing import Any
 
+import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.export.export import facts, plants_of, policy_bytes
@@ -17,12 +17,12 @@ from agents.training.best import Best
 from agents.training.building import warm_up_steps
 from agents.training.evaluation import Score, evaluate, value_of
 from agents.training.record import Clock, Run
+from sweeps.progress import Advance, Start
 from sweeps.worker import is_needed
 
 PARTS, PASSES = 16, 10
 """Critic warm-up: number of parts that a batch is split into, and epochs per rollout."""
-SMALLEST = 32
-"""Smallest batch of the warm-up."""
+SMALLEST = 32  # smallest batch of the warm-up
 
 
 class RolloutCallback(BaseCallback):
@@ -154,3 +154,28 @@ class Checkpoints(PeriodicCallback):
             "snapshot": snapshot.take(self.model),
         }
         checkpoint.save(self.path, content)
+
+
+class TrainingProgress(RolloutCallback):
+    """Report steps, rate and the mean return of the last 100 episodes."""
+
+    def __init__(self, total: int, start: Start) -> None:
+        super().__init__()
+        self.total, self.start = total, start
+        self.first = self.done = 0
+        self.began = 0.0
+
+    def _on_training_start(self) -> None:
+        self.began = time.perf_counter()
+        self.first = self.done = self.model.num_timesteps
+        self.advance: Advance = self.start(self.total, self.first)
+
+    def _on_training_end(self) -> None:
+        self._on_rollout_start()
+
+    def _on_rollout_start(self) -> None:
+        fresh, self.done = self.model.num_timesteps - self.done, self.model.num_timesteps
+        rate = (self.done - self.first) / max(time.perf_counter() - self.began, 1e-9)
+        returns = [float(episode["r"]) for episode in self.model.ep_info_buffer or ()]
+        mean = f", return {np.mean(returns):.1f}" if returns else ""
+        self.advance(fresh, f", {rate:,.0f} steps/s{mean}")

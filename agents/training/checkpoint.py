@@ -4,8 +4,6 @@ A file consists of a magic number, the SHA-256 of the rest, and tensors, numbers
 format. It is read with ``weights_only=True``, which builds no other types.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 from pathlib import Path
@@ -14,7 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from agents.policies.policy_file import TEMPORARY, write_atomically
+from sweeps.files import TEMPORARY, write_bytes
 
 MARK = b"PAMCKPT1"
 
@@ -34,7 +32,7 @@ def save(path: Path, content: dict[str, Any]) -> None:
     buffer = io.BytesIO()
     torch.save(_tensors(content), buffer)
     payload = buffer.getvalue()
-    write_atomically(path, MARK + hashlib.sha256(payload).digest() + payload)
+    write_bytes(path, MARK + hashlib.sha256(payload).digest() + payload)
 
 
 def load(path: Path) -> dict[str, Any]:

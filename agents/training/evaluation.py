@@ -3,8 +3,6 @@
 The policy runs as it will be exported: in onnxruntime, with its controller.
 """
 
-from __future__ import annotations
-
 import math
 import statistics
 from dataclasses import dataclass
@@ -22,26 +20,19 @@ from agents.settings.presets import Config
 from baselines.core.catalogue import make_controller
 
 TRAVEL = "effort/pressure_travel"
-MORE_TRAVEL = 1.05
-"""Largest ratio of a policy's travel to its controller's without a penalty."""
+MORE_TRAVEL = 1.05  # largest ratio of a policy's travel to its controller's without a penalty
 
 
 @dataclass(frozen=True)
 class Score:
-    """Result of an evaluation.
+    """Result of an evaluation."""
 
-    ``rms`` is of ``output - reference`` (SI) over the evaluated instants of all episodes, ``kinds``
-    of each kind of row (see :meth:`agents.settings.presets.Config.kinds`); ``mean_return`` the sum
-    of rewards of an episode, mean over episodes; ``failures`` the number of episodes that a limit
-    ended; ``travel`` the change of the pressure setpoints in a control period [Pa], mean over these
-    instants.
-    """
-
-    rms: float
-    mean_return: float
-    failures: int
+    rms: float  # of output - reference (SI) over the evaluated instants of all episodes
+    mean_return: float  # sum of rewards of an episode, mean over episodes
+    failures: int  # episodes that a limit ended
+    # change of the pressure setpoints in a control period [Pa], mean over these instants
     travel: float = 0.0
-    kinds: tuple[float, ...] = ()
+    kinds: tuple[float, ...] = ()  # RMS of each kind of row (agents.settings.presets.Config.kinds)
 
     def as_dict(self, steps: int) -> dict[str, Any]:
         """Return the entry of a card, for the policy after ``steps`` control periods."""

@@ -1,7 +1,5 @@
 """Training run: settings, folder, command that reproduces it, and cost."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json
@@ -18,6 +16,7 @@ from agents.settings import presets as configs
 from agents.settings import seeds
 from agents.settings.presets import Config
 from agents.settings.schema import SettingsError
+from sweeps.files import sources_digest
 from sweeps.versions import versions_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -48,10 +47,7 @@ class Run:
 
     @property
     def key(self) -> str:
-        """Digest of settings, seed, folder, package versions and code.
-
-        A worker with other code or packages computes another key and refuses the training.
-        """
+        """Digest of settings, seed, folder, package versions and code; workers must agree."""
         parts = [self.config.as_dict(), self.seed, str(self.folder), versions_of(PACKAGES), code()]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:32]
 
@@ -67,10 +63,7 @@ class Run:
         return True
 
     def command(self) -> str:
-        """Return the command that reproduces the policy.
-
-        Without a preset of these settings it takes them from ``policy.onnx``.
-        """
+        """Return the command that reproduces the policy, from ``policy.onnx`` without a preset."""
         config = self.config
         words = ["python -m agents train", config.env, "--algo", config.algo]
         words += ["--steps", str(config.steps), "--seed", str(self.seed)]
@@ -95,11 +88,7 @@ class Run:
 @cache
 def code() -> str:
     """Return a digest of the Python files that a training runs, as first read by this process."""
-    state = hashlib.sha256()
-    for path in sorted(path for name in SOURCES for path in (ROOT / name).rglob("*.py")):
-        state.update(path.relative_to(ROOT).as_posix().encode())
-        state.update(path.read_bytes())
-    return state.hexdigest()[:16]
+    return sources_digest([ROOT / name for name in SOURCES], {".py"})
 
 
 @dataclass

@@ -5,8 +5,6 @@ environment, random generators and counters. The bits are equal for the same lib
 type of processor and one torch thread.
 """
 
-from __future__ import annotations
-
 import json
 import random
 from collections import deque

@@ -4,18 +4,17 @@ A finished training is kept, and a killed one continues from its checkpoint. The
 of ``python -m agents train``, bit for bit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from filelock import FileLock
 
-from agents.policies.policy_file import POLICY, RECORD, finished, write_atomically
+from agents.policies.policy_file import POLICY, RECORD, finished
 from agents.settings.presets import Config
 from agents.training.record import Run
 from sweeps import engine
+from sweeps.files import write_bytes
 
 LOG, LOCK = "log.txt", "training.lock"
 
@@ -50,10 +49,7 @@ def run(
     cluster: engine.Cluster,
     start: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> Report:
-    """Run the trainings that are not finished.
-
-    ``start`` is called with their number and returns the function to call after each of them.
-    """
+    """Run the unfinished trainings; ``start`` takes their number and returns a callback."""
     named = {training.key: training for training in trainings}
     left = {key: training for key, training in named.items() if not training.finished()}
     report = Report(found=[named[key].folder / POLICY for key in named if key not in left])
@@ -73,9 +69,8 @@ def _keep(folder: Path, files: dict[str, bytes]) -> None:
     """Write the files of a worker that does not share this folder, the record first."""
     if finished(folder / POLICY) is not None:
         return
-    folder.mkdir(parents=True, exist_ok=True)
     for name in (RECORD, POLICY):
-        write_atomically(folder / name, files[name])
+        write_bytes(folder / name, files[name])
 
 
 def train(run: Run) -> dict[str, bytes]:

@@ -11,8 +11,6 @@ processor. Torch uses one thread, since sums depend on the number of threads. On
 differs: it holds the steps between the last checkpoint and the kill twice.
 """
 
-from __future__ import annotations
-
 import json
 from importlib.util import find_spec
 from pathlib import Path
@@ -25,12 +23,11 @@ from stable_baselines3.common.logger import configure
 from agents.export.export import export_policy, facts, plants_of
 from agents.policies.policy_file import POLICY, finished
 from agents.settings import presets as configs
-from agents.training import checkpoint, snapshot
+from agents.training import callbacks, checkpoint, snapshot
 from agents.training.best import Best
 from agents.training.building import make_env, make_model
-from agents.training.callbacks import Cancellation, Checkpoints, Evaluations, WarmUp
+from agents.training.callbacks import Checkpoints, Evaluations
 from agents.training.checkpoint import CheckpointError
-from agents.training.progress import TrainingProgress
 from agents.training.record import CHECKPOINT, Clock, Run, cost
 from sweeps.progress import progress
 
@@ -96,10 +93,14 @@ def train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
     left = run.config.steps - model.num_timesteps
     if left > 0:
         with progress("steps", console) as begin:
-            watched = [evaluations, checkpoints, TrainingProgress(run.config.steps, begin)]
+            watched = [
+                evaluations,
+                checkpoints,
+                callbacks.TrainingProgress(run.config.steps, begin),
+            ]
             model.learn(
                 left,
-                callback=[Cancellation(), WarmUp(run.config), *watched],
+                callback=[callbacks.Cancellation(), callbacks.WarmUp(run.config), *watched],
                 reset_num_timesteps=model.num_timesteps == 0,
                 log_interval=1 if run.config.algo in configs.ON_POLICY else 100,
             )

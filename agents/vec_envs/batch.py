@@ -1,14 +1,11 @@
 """Adapter of batched environments to stable-baselines3: one kernel call per step and batch.
 
-There are no processes and no loop over environments. stable-baselines3 expects a list of ``info``
-dictionaries; here all rows whose episode continues share one empty dictionary.
+There are no processes and no loop over environments.
 """
-
-from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -22,32 +19,11 @@ import pam_envs  # noqa: F401  (registers the environments)
 FINAL_KEYS = ("final_obs", "final_info")
 
 
-class NoInfo(dict[str, Any]):
-    """The empty ``info`` that rows share, which refuses writes."""
-
-    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
-        raise TypeError("this info is shared by all rows and stays empty; copy it to add to it")
-
-    __setitem__ = update = setdefault = __ior__ = _refuse
-
-
-NO_INFO = NoInfo()
-
-
 def make_batch_vec_env(env_id: str, num_envs: int, *kinds: Mapping[str, Any], **kwargs: Any) -> Any:
-    """Return ``num_envs`` environments for stable-baselines3.
+    """Return ``num_envs`` environments of each kind, or of one kind, for stable-baselines3.
 
-    Parameters
-    ----------
-    env_id : str
-        A registered environment, for example ``"PAM/MusclePositioning-v0"``.
-    num_envs : int
-        Number of rows of each kind.
-    *kinds : mapping
-        Arguments of each kind of rows; none for one kind.
-    **kwargs
-        Arguments of all rows. ``info=True`` makes each step report ``info``, which is slower and
-        which learning does not need.
+    ``kinds`` are arguments of each kind of rows, ``kwargs`` those of all rows. ``info=True`` makes
+    each step report ``info``, which is slower and which learning does not need.
     """
     return BatchVecEnv(
         *(
@@ -65,19 +41,10 @@ def make_batch_vec_env(env_id: str, num_envs: int, *kinds: Mapping[str, Any], **
 class BatchVecEnv(VecEnv):
     """``VecEnv`` over the rows of batched Gymnasium environments, one batch after the other.
 
-    Row ``i`` after ``seed(s)`` is the single environment reset with ``s + i``, bit for bit.
+    The batches have the same spaces and ``AutoresetMode.SAME_STEP``, or a ValueError is raised. Row
+    ``i`` after ``seed(s)`` is the single environment reset with ``s + i``, bit for bit.
     ``infos[i]`` is empty unless an episode ended in row ``i``; then it holds
     ``terminal_observation`` and ``TimeLimit.truncated``.
-
-    Parameters
-    ----------
-    *batches : gymnasium.vector.VectorEnv
-        With the same spaces and ``AutoresetMode.SAME_STEP``.
-
-    Raises
-    ------
-    ValueError
-        If a batch has another reset mode.
     """
 
     def __init__(self, *batches: VectorEnv[Any, Any, Any]) -> None:
@@ -158,13 +125,7 @@ class BatchVecEnv(VecEnv):
         return [whole[row] for row in self._indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute of all batches.
-
-        Raises
-        ------
-        ValueError
-            If ``indices`` are only some rows: rows share their attributes.
-        """
+        """Set an attribute of all batches; their rows share it, so ``indices`` must be all."""
         self._check_all_rows(f"set_attr({attr_name!r})", indices)
         for batch in self.batches:
             setattr(batch.unwrapped, attr_name, value)
@@ -172,13 +133,7 @@ class BatchVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
     ) -> list[Any]:
-        """Call a method of all batches once; every row gets its batch's result.
-
-        Raises
-        ------
-        ValueError
-            If ``indices`` are only some rows: a method acts on all.
-        """
+        """Call a method of all batches once; every row gets its batch's result."""
         self._check_all_rows(f"env_method({method_name!r})", indices)
         made = [getattr(batch.unwrapped, method_name)(*args, **kwargs) for batch in self.batches]
         rows = zip(made, self.batches, strict=True)
@@ -238,10 +193,10 @@ def _stepped(batch: Any, actions: NDArray[Any]) -> tuple[Any, Any, Any, list[dic
 
 
 def _rows_of(infos: Mapping[str, Any], rows: int) -> list[dict[str, Any]]:
-    """Return the infos by row; rows without any share one."""
+    """Return the infos by row."""
     keys = [k for k in infos if not k.startswith("_") and k not in FINAL_KEYS]
     if not keys:
-        return [NO_INFO] * rows
+        return [{} for _ in range(rows)]
     columns = [np.asarray(infos[k]).tolist() for k in keys]
     return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
 

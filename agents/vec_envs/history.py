@@ -1,7 +1,5 @@
 """Environment whose observation includes signals of the last control periods."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,18 +11,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 
 class HistoryVecEnv(VecEnvWrapper):
-    """Append past values of some columns, the latest first; at reset they equal the present values.
-
-    The exported policy does the same inside its graph (:mod:`agents.export.graph`).
-
-    Parameters
-    ----------
-    venv : VecEnv
-    columns : sequence of int
-        Of the observation.
-    frames : int
-        Number of past control periods.
-    """
+    """Append past values of some columns, the latest first; at reset they equal the present."""
 
     def __init__(self, venv: VecEnv, columns: Sequence[int], frames: int) -> None:
         self.columns = list(columns)

@@ -1,7 +1,5 @@
 """Environment of a residual policy, whose action corrects a controller's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -17,25 +15,11 @@ from agents.settings.schema import SettingsError
 class ResidualVecEnv(VecEnvWrapper):
     """The plant gets ``controller's action + scale * action``, clipped to its range.
 
-    The controller runs on all rows at once, with a state for each, and its action is appended to
-    the observation. Rows on different plants have a controller each, built from their nominal
-    plant.
-
-    Parameters
-    ----------
-    venv : VecEnv
-        With actions in [-1, 1].
-    name : str
-        Of the controller.
-    make : callable
-        Makes the controller from a nominal plant.
-    scale : float
-        See :class:`agents.settings.parts.Residual`.
-
-    Attributes
-    ----------
-    record : dict or None
-        The card's entry on the controller, once it is recorded.
+    The controller, which ``make`` makes from a nominal plant, runs on all rows at once, with a
+    state for each, and its action is appended to the observation; rows on different plants have a
+    controller each. The actions of ``venv`` are in [-1, 1]; ``scale`` is that of
+    :class:`agents.settings.parts.Residual`; ``record`` is the card's entry on the controller, once
+    it is recorded.
     """
 
     def __init__(self, venv: VecEnv, name: str, make: Callable[[Any], Any], scale: float) -> None:

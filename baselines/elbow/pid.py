@@ -7,8 +7,8 @@ friction grows with it, so that a higher one degrades the torque.
 
 Tuning: SIMC (skogestad2003) for a lag, with the steepest torque per pressure over the range and the
 regulator's lag. On/off valves have a rate (3 bar in 3 s) instead of a lag: the rule is applied to
-one cycle as lag, an assumption. The dead time is half of the hold of a command, and a control
-period of computing.
+one cycle as lag, an assumption. The dead time is that of the regulator, half of the hold of a
+command, and a control period of computing.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def simc_torque(plant: ElbowOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
     pulsed = plant.valves == "on_off"
     step = plant.cycle if pulsed else plant.control_period
     tau = step if pulsed else plant.regulator.time_constant
-    theta = 0.5 * step + plant.control_period
+    theta = 0.5 * step + plant.control_period + plant.dead_time
     return simc_rule(steepest, tau, 0.0, theta, knobs=knobs).parallel(plant.control_period)
 
 

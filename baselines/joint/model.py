@@ -9,7 +9,8 @@ In an arm a joint also moves the distal links: its pole is the frequency at whic
 own setpoint by 90 degrees, as ``p^2 / (s + p)^2`` does at ``p`` (and an oscillating joint at its
 natural frequency), at most that of a single stage. Its delay for slow setpoints is the mean time of
 its impulse response, ``2 / p`` for a double pole and less for an oscillating joint. Both are found
-by small steps of one joint at a time, with the arm straight and without hysteresis.
+by small steps of one joint at a time, with the arm straight, without hysteresis, and behind the
+regulators' lag alone. The regulators' dead time precedes the motion.
 
 A model of the motion runs beside every controller, driven by the difference between the applied
 command and the controller's own (:mod:`baselines.linear.bumpless` with gains of 0). The controller
@@ -19,8 +20,9 @@ episode starts from the present command.
 The PI of fluidic_muscles (section 4) puts its zero on one of the two poles ``p`` of the nominal
 plant ``K p^2 / (s + p)^2``, so that the loop is ``K_p K p^2 / (s (s + p))``, and takes the gain
 for a damping ``D``: ``K_p K = 1 / (4 D^2)``, ``K_i = p K_p``. At ``D = 1/sqrt(2)`` and 23 rad/s
-they are 0.5 and 11.5 1/s. The slow PI cancels the pole too, with the crossover required of the
-disturbance loop, ``K_i K = 4 rad/s`` (in proportion to ``p`` for other poles).
+they are 0.5 and 11.5 1/s. The paper's plant has no dead time; here it counts as a further lag, and
+divides both gains by ``1 + theta p``. The slow PI cancels the pole too, with the crossover required
+of the disturbance loop, ``K_i K = 4 rad/s`` (in proportion to ``p`` for other poles).
 
 The model loop of model-following control is computed and not measured: it runs in continuous time,
 with the reference held over a period, and its mean command over the period is applied. Joint and
@@ -48,7 +50,14 @@ from scipy.linalg import expm
 
 from baselines.core.controller import Array
 from baselines.linear.bumpless import Bumpless, BumplessGains
-from baselines.linear.systems import DiscreteSystem, StateSpace, discrete, double_lag, state_space
+from baselines.linear.systems import (
+    DiscreteSystem,
+    StateSpace,
+    delayed,
+    discrete,
+    double_lag,
+    state_space,
+)
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.identification.joint_forc import measure_joint
@@ -66,7 +75,8 @@ class JointModel:
     """Nominal model of joints.
 
     Hysteresis, or a line with a slope, maps setpoints between ``low`` and ``high`` [rad] to angles
-    at rest [rad]; the double pole of each joint [rad/s] follows. Control period in s.
+    at rest [rad]; the double pole of each joint [rad/s] follows, behind a dead time. Control period
+    and dead time in s.
     """
 
     hysteresis: Preisach | None
@@ -75,11 +85,12 @@ class JointModel:
     period: float
     poles: tuple[float, ...] = (POLE,)
     slope: float = 1.0
+    dead_time: float = 0.0
 
     @cached_property
     def motion(self) -> DiscreteSystem:
         """The motion of each joint at the control period, exact for an input that is held."""
-        motions = [discrete(double_lag(pole), self.period, "zoh") for pole in self.poles]
+        motions = [delayed(double_lag(pole), self.dead_time, self.period) for pole in self.poles]
         return DiscreteSystem.stacked(motions)
 
     @cached_property
@@ -147,7 +158,9 @@ def joint_model(plant: Any, poles: tuple[float, ...] = (POLE,)) -> JointModel:
         if not (found.symmetric and found.preisach):
             warnings.warn(f"the hysteresis of the nominal plant {found.verdict}", stacklevel=2)
         _HYSTERESIS_MODELS[key] = found.model
-    return JointModel(_HYSTERESIS_MODELS[key], low, high, plant.control_period, poles)
+    return JointModel(
+        _HYSTERESIS_MODELS[key], low, high, plant.control_period, poles, dead_time=plant.dead_time
+    )
 
 
 STEP = 0.02
@@ -167,11 +180,11 @@ def joint_poles(plant: Any) -> tuple[float, ...]:
 
 def joint_delays(plant: Any) -> tuple[float, ...]:
     """Return the delay of each joint [s] for slow setpoints, without the hold."""
-    return tuple(delay for _, delay in _dynamics(plant))
+    return tuple(plant.dead_time + delay for _, delay in _dynamics(plant))
 
 
 def _dynamics(plant: Any) -> tuple[tuple[float, float], ...]:
-    """Return pole [rad/s] and delay [s] of each joint, cached by plant."""
+    """Return pole [rad/s] and delay [s], without dead time, of each joint, cached by plant."""
     from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 
     if plant.stages == 1:
@@ -180,7 +193,7 @@ def _dynamics(plant: Any) -> tuple[tuple[float, float], ...]:
     for joint in range(plant.stages) if key not in _DYNAMICS else ():
         commands = np.zeros((round(SECONDS / period), plant.stages))
         commands[1:, joint] = STEP
-        smooth = plant.replace({"hysteresis.width": 0.0})
+        smooth = plant.with_lag_alone().replace({"hysteresis.width": 0.0})
         pulse = np.diff(simulate_manipulator(smooth, commands)["angle"][:, joint])
         behind = np.flatnonzero(-phase(pulse, period) > 0.5 * np.pi)
         pole = min(POLE, float(FREQUENCIES[behind[0]])) if behind.size else POLE
@@ -213,15 +226,17 @@ class PiGains(NamedTuple):
     integral: float
 
 
-def pole_cancelling(gain: float = 1.0, pole: float = POLE, damping: float = DAMPING) -> PiGains:
-    """Return the gains that cancel a pole [rad/s] and give a damping; see this module's page."""
-    proportional = 1.0 / (4.0 * damping**2 * gain)
+def pole_cancelling(
+    gain: float = 1.0, pole: float = POLE, damping: float = DAMPING, dead_time: float = 0.0
+) -> PiGains:
+    """Return the gains that cancel a pole [rad/s] and give a damping; see the module."""
+    proportional = 1.0 / (4.0 * damping**2 * gain * (1.0 + dead_time * pole))
     return PiGains(proportional, proportional * pole)
 
 
-def pi_delay(pole: float, damping: float = DAMPING) -> float:
+def pi_delay(pole: float, damping: float = DAMPING, dead_time: float = 0.0) -> float:
     """Return the delay [s] of the closed loop of that PI for slow references."""
-    return 4.0 * damping**2 / pole
+    return 4.0 * damping**2 * (1.0 / pole + dead_time)
 
 
 def pi_system(gains: PiGains) -> StateSpace:

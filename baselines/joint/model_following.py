@@ -7,7 +7,8 @@ fluidic_muscles, section 4, Fig. 11:
     command            u = H^-1(u_mod + u_dis)         (+ gravity feedforward)
 
 The model loop has no disturbance: its PI (pole cancellation, ``D = 1/sqrt(2)``) is designed for
-tracking only. The disturbance loop compares the joint with the model instead of the reference, and
+tracking only; the model's angle, behind the regulators' dead time, is that with which the
+disturbance loop compares the joint. The disturbance loop
 is designed for disturbance rejection only (:mod:`baselines.robust.requirements`). With an exact
 inverse and an exact model of the motion the joint equals its model, and the disturbance loop is at
 rest.
@@ -113,7 +114,7 @@ def make_model_following(
     """
     model = joint_model(spec.plant, joint_poles(spec.plant)).narrowed(inverse)
     damping, pace = spec.knob("damping"), spec.knob("disturbance")
-    delays = [pi_delay(pole, damping * DAMPING) for pole in model.poles]
+    delays = [model.dead_time + pi_delay(pole, damping * DAMPING) for pole in model.poles]
     return ModelFollowing(
         make_parts(spec, model, gravity, delays if ahead else None),
         make_model_loop(model, damping * DAMPING),

@@ -3,8 +3,8 @@
 The reference tension over the measured stretch of the muscle is the reference stiffness (yeh2010,
 section 4.1). Its pressure comes from the inverse of the identified hysteresis ("inverse"), from the
 straight line between the tips of its loop ("line"), or is the nominal pressure ("nominal"). The
-inverse is static, as in yeh2010, without the regulator's lag; with a preview it tracks the
-reference stiffness one lag ahead.
+inverse is static, as in yeh2010, without the regulator's dead time and lag; with a preview it
+tracks the reference stiffness ahead by both.
 
 In stance, and with the brace alone, the reference tension is tracked; in swing the tension cancels
 the wire's torque on the knee.
@@ -92,12 +92,13 @@ class Forward:
 
 
 def make_forward(spec: Spec[KneeOrthosis], kind: Kind, preview: bool) -> Forward:
-    """Return the feedforward; a preview is by the regulator's lag and half a control period."""
+    """Return the feedforward; a preview is by dead time, lag and half a control period."""
     observer, signals = make_knee_observer(spec), spec.signals
     if not preview:
         return Forward(kind, observer)
     names = preview_names("reference", signals)
-    delay = spec.plant.regulator.time_constant + 0.5 * spec.plant.control_period
+    law = spec.plant.regulator
+    delay = law.dead_time + law.time_constant + 0.5 * spec.plant.control_period
     times = [signals[name].ahead for name in names]
     return Forward(
         kind,
@@ -137,7 +138,7 @@ class KneeForward(RowController):
 def make_knee_forward(
     spec: Spec[KneeOrthosis], kind: Kind = "inverse", assist: bool = True, preview: bool = False
 ) -> KneeForward:
-    """Return the controller; ``preview``: whether the reference is previewed by one lag."""
+    """Return the controller; ``preview``: whether the reference is previewed."""
     signal = spec.actions["pressure_set_point"]
     return KneeForward(make_forward(spec, kind, preview), signal, assist)
 
@@ -160,7 +161,7 @@ ENTRIES = {
         citation="yeh2010",
     ),
     "knee_inverse_ahead": FORWARD(
-        "knee_inverse at the reference previewed by one lag of the regulator",
+        "knee_inverse at the reference previewed by dead time and lag of the regulator",
         make=partial(make_knee_forward, preview=True),
         preview=True,
         citation="yeh2010",

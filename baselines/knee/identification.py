@@ -7,6 +7,8 @@ mounting of the orthosis in the test is part of the identified plant:
 - tension in a rig or on a leg: at the nominal length, as held by a leg that bears weight;
 - angle on a leg: with the inertia, damping and hold of a hanging leg.
 
+The regulator has its lag alone: a rational function is no model of dead time and rate limit.
+
 All of the paper's tests are without a leg: its angle controller would face 25 times the inertia of
 its design.
 """
@@ -48,7 +50,7 @@ ORDERS: dict[tuple[str, str, str], tuple[int, int]] = {
 
 def tested(plant: KneeOrthosis, output: Output) -> KneeOrthosis:
     """Return the orthosis as mounted in the test of an output; see the module."""
-    quiet = plant.without_noise()
+    quiet = plant.without_noise().with_lag_alone()
     if output == "tension":
         free = plant.mounting == "no_load"
         return dataclasses.replace(quiet, mounting="no_load" if free else "rig")

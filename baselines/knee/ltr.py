@@ -16,8 +16,13 @@ Design of both:
 
 with a compensator for transfer between controllers and limited commands
 (:mod:`baselines.linear.bumpless`). The bandwidths are those of yeh2010, section 4.1, read in
-rad/s. The gains of the compensator are 0, which satisfies its inequality for every stable plant.
-The designs are in kPa, as in the paper; the loops command Pa of deviation from a feedforward.
+rad/s, where the regulator has no dead time: the paper's identified plant has none. A dead time, of
+which an identified rational function is no model, limits the bandwidth to ``REACH`` over it, and
+the compensators' models are behind it. The gains of the compensator are 0, which satisfies its
+inequality for every stable plant. The setpoint changes no faster than the pressure can: the rate
+limit is one of the command, which the compensators count, and not one of the plant, which would
+oscillate. The designs are in kPa, as in the paper; the loops command Pa of deviation from a
+feedforward.
 """
 
 from __future__ import annotations
@@ -29,11 +34,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, RowController, encode_action
+from baselines.core.controller import Prediction, RowController, encode_action
 from baselines.core.entry import AS_DESIGNED, GAIT, Bounds, Knobs, Spec
 from baselines.knee.feedforward import FORWARD, Forward, Kind, make_forward
 from baselines.knee.feedforward import KNOBS as PREVIEW_KNOBS
 from baselines.knee.identification import Output, identify
+from baselines.knee.nominal import Limits, set_point_limits
 from baselines.knee.published import printed_bumpless, printed_controller
 from baselines.linear.bumpless import Bumpless, BumplessGains, BumplessState, make_bumpless
 from baselines.linear.ltr import LtrDesign, design_ltr
@@ -46,6 +52,8 @@ KILO = 1e3
 """Pascals in the designs' unit of pressure."""
 BANDWIDTHS: dict[Output, float] = {"tension": 26.2, "angle": 14.4}
 """Bandwidths of the target loops [rad/s]."""
+REACH = 0.5
+"""Largest bandwidth times dead time: a phase loss of 29 degrees."""
 RECOVERY = {"lag": 1e-5, "measured": 1e-7}
 """Control weight over the squared static gain of the plant: recovers the bandwidth to a fifth, with
 at most the high-frequency gain of the printed controller."""
@@ -57,7 +65,10 @@ _DESIGNS: dict[tuple[str, str, float, float], LtrDesign] = {}
 
 def design(plant: KneeOrthosis, output: Output, knobs: Knobs = AS_DESIGNED) -> LtrDesign:
     """Return the design for an output of a nominal plant, identified about 2 bar."""
-    target = knobs.get("bandwidth", 1.0) * BANDWIDTHS[output]
+    usual = BANDWIDTHS[output]
+    if plant.dead_time > 0.0:
+        usual = min(usual, REACH / plant.dead_time)
+    target = knobs.get("bandwidth", 1.0) * usual
     recovery = knobs.get("recovery", 1.0)
     key = (plant.digest(), output, target, recovery)
     if key not in _DESIGNS:
@@ -88,7 +99,9 @@ def _in_pascals(
 ) -> Bumpless:
     """Return a loop whose commands are in Pa, from a design in kPa."""
     full = plant.regulator.max_pressure
-    loop = make_bumpless(model, controller, plant.control_period, -full / KILO, full / KILO, gains)
+    loop = make_bumpless(
+        model, controller, plant.control_period, -full / KILO, full / KILO, gains, plant.dead_time
+    )
     return replace(
         loop,
         controller=loop.controller.scaled(outputs=KILO),
@@ -115,6 +128,7 @@ class KneeLtr(RowController):
     angle: Bumpless | None
     forward: Forward
     action_signal: Signal
+    within: Limits
 
     def initial_state(self, observation: ArrayLike) -> LtrState:
         """Return the state at rest, or holding the present setpoint."""
@@ -131,30 +145,19 @@ class KneeLtr(RowController):
         reference, free = forward.tensions(view, observation)
         stance = forward.pressure(reference, view.stretch, state.hysteresis)
         tension = view.reference, view.tension
-        command = stance + self._share(self.tension, *tension, stance, state.tension)
+        low, high = self.within(view)
+        command = stance + self.tension.output(*tension, state.tension, low - stance, high - stance)
         used, after = stance, state.angle
         if self.angle is not None and state.angle:
             path = view.angle_reference, view.angle
             swing = forward.pressure(free, view.stretch, state.hysteresis)
-            swung = swing + self._share(self.angle, *path, swing, state.angle)
+            swung = swing + self.angle.output(*path, state.angle, low - swing, high - swing)
             command = np.where(view.stance, command, swung)
             used = np.where(view.stance, stance, swing)
             after = self.angle.advance(*path, command - swing, state.angle, ~view.stance)
         held = self.tension.advance(*tension, command - stance, state.tension, view.stance)
         following = LtrState(held, after, forward.advance(used, state.hysteresis))
         return encode_action(self.action_signal, command, observation), following
-
-    def _share(
-        self,
-        loop: Bumpless,
-        reference: Array,
-        measured: Array,
-        forward: Array,
-        state: BumplessState,
-    ) -> Array:
-        """Return a loop's share of the setpoint [Pa], within the range left by the feedforward."""
-        low, high = self.action_signal.low - forward, self.action_signal.high - forward
-        return loop.output(reference, measured, state, low, high)
 
 
 def make_knee_ltr(
@@ -167,7 +170,7 @@ def make_knee_ltr(
     """Return the controller.
 
     ``bumpless``: whether the compensators are active; ``printed``: whether the tension controller
-    is the printed one; ``preview``: whether the feedforward is previewed by one lag. The knobs of
+    is the printed one; ``preview``: whether the feedforward is previewed. The knobs of
     :data:`baselines.knee.ltr.KNOBS` are for the tension loop only.
     """
     plant, ahead = spec.plant, make_forward(spec, forward, preview)
@@ -176,6 +179,7 @@ def make_knee_ltr(
         make_loop(plant, "angle", bumpless) if ahead.observer.gait else None,
         ahead,
         spec.actions["pressure_set_point"],
+        set_point_limits(spec),
     )
 
 
@@ -201,7 +205,7 @@ ENTRIES = {
         knobs=KNOBS,
     ),
     "knee_inverse_ahead_ltr": LTR(
-        "knee_inverse_ltr, its feedforward previewed by one lag of the regulator",
+        "knee_inverse_ltr, its feedforward previewed by dead time and lag of the regulator",
         make=partial(make_knee_ltr, preview=True),
         preview=True,
         citation="yeh2010; athans1986; zaccarian2002",

@@ -9,6 +9,7 @@ stiffness ``s`` becomes the reference tension ``s (L - L_min)`` at the sensed an
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -168,3 +169,19 @@ def make_knee_observer(spec: Spec[KneeOrthosis]) -> KneeObserver:
         raise ValueError(f"reference is in {unit}; the knee's controllers track N or N/m")
     names = [*NAMES, *(GAIT_NAMES if gait else ())]
     return KneeObserver(KneeNominal(spec.plant), reader(signals, names), gait, unit == "N/m")
+
+
+Limits = Callable[[KneeView], tuple[Array, Array]]
+"""From a view to the lowest and highest setpoint [Pa] of the next period, shapes (n_env,)."""
+
+
+def set_point_limits(spec: Spec[KneeOrthosis]) -> Limits:
+    """Return the limits of a setpoint that changes no faster than the pressure of the plant can."""
+    signal, plant = spec.actions["pressure_set_point"], spec.plant
+    step = plant.regulator.slew_rate * plant.control_period
+
+    def limits(view: KneeView) -> tuple[Array, Array]:
+        low = np.maximum(signal.low, view.set_point - step)
+        return low, np.minimum(signal.high, view.set_point + step)
+
+    return limits

@@ -2,10 +2,13 @@
 
 Tuning: :mod:`baselines.linear.pid` for a lag with dead time and ``tau_c = theta``, with K the
 steepest static tension per pressure of the nominal orthosis. For a regulator with lag, tau_1 is its
-time constant and theta one and a half control periods. For the published dynamics, whose 0.3 s are
-distributed over seven poles, the half rule assigns half of their sum to each of the two.
+time constant and theta its dead time and one and a half control periods. For the published
+dynamics, whose 0.3 s are distributed over seven poles, the half rule assigns half of their sum to
+each of the two.
 
-The reference tension is tracked in stance and in swing; there is no second controller.
+The reference tension is tracked in stance and in swing; there is no second controller. The setpoint
+changes no faster than the pressure can, so that the rate limit saturates the command and not the
+plant.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from baselines.core.entry import AS_DESIGNED, KNEE, Entry, Knobs, Spec
-from baselines.knee.nominal import KneeNominal, make_knee_observer
+from baselines.knee.nominal import KneeNominal, make_knee_observer, set_point_limits
 from baselines.knee.published import printed_plant
 from baselines.linear.pid import DELAY_PERIODS, PI_KNOBS, Gains, Pid, PidView, simc_rule
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -22,7 +25,7 @@ from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 def simc_tension(plant: KneeOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
     """Return the gains [Pa/N] of the rule for a nominal orthosis; see the module."""
     period, tau = plant.control_period, plant.regulator.time_constant
-    theta = DELAY_PERIODS * period
+    theta = DELAY_PERIODS * period + plant.dead_time
     if plant.dynamics == "measured":
         tau = 0.5 * _sum_of_lags()
         theta = theta + tau
@@ -39,10 +42,11 @@ def _sum_of_lags() -> float:
 def make_knee_pid(spec: Spec[KneeOrthosis]) -> Pid:
     """Return the controller."""
     observer, signal = make_knee_observer(spec), spec.actions["pressure_set_point"]
+    within = set_point_limits(spec)
 
     def view(observation: ArrayLike) -> PidView:
         seen = observer.read(observation)
-        return PidView(seen.set_point, seen.tension, seen.reference, signal.low, signal.high)
+        return PidView(seen.set_point, seen.tension, seen.reference, *within(seen))
 
     return Pid(simc_tension(spec.plant, spec.knobs), view, signal, spec.plant.control_period)
 

@@ -39,7 +39,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import cdf2rdf
 
 from baselines.core.controller import Array
-from baselines.linear.systems import DiscreteSystem, StateSpace, discrete, time_constant
+from baselines.linear.systems import DiscreteSystem, StateSpace, delayed, discrete, time_constant
 
 SMALLEST = 1e-7
 """Distance from the inequality's bound that counts as feasible."""
@@ -181,14 +181,17 @@ def make_bumpless(
     low: float,
     high: float,
     gains: BumplessGains | None = None,
+    dead_time: float = 0.0,
 ) -> Bumpless:
     """Return a controller with its compensator at a control period [s].
 
-    The controller is made discrete by the bilinear rule, the plant with its hold. The default gains
-    are those of :func:`design_bumpless`.
+    The controller is made discrete by the bilinear rule, the plant with its hold and behind a dead
+    time [s]. The default gains are those of :func:`design_bumpless`.
     """
     chosen = design_bumpless(plant) if gains is None else gains
-    model = discrete(plant, period, "zoh")
+    model = delayed(plant, dead_time, period)
+    waiting = np.zeros(model.b.shape[-1] - plant.nstates)
+    chosen = replace(chosen, state_gain=np.append(chosen.state_gain, waiting))
     return Bumpless(discrete(controller, period), model, chosen, low, high)
 
 

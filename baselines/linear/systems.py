@@ -7,6 +7,7 @@ rows at once. python-control is imported when a system is built: its import take
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -93,6 +94,32 @@ def discrete(system: StateSpace, period: float, method: Method = "bilinear") -> 
     return DiscreteSystem(
         sampled.A, sampled.B[:, 0], sampled.C[0], np.asarray(sampled.D[0, 0]), period
     )
+
+
+def delayed(system: StateSpace, dead_time: float, period: float) -> DiscreteSystem:
+    """Return a strictly proper system behind a dead time [s] at a control period [s].
+
+    Exact for an input that is held over the period, which the last states hold.
+    """
+    n = math.ceil(dead_time / period - 1e-9)
+    if n <= 0:
+        return discrete(system, period, "zoh")
+    late = period - max(0.0, n * period - dead_time)  # for which the older input acts
+    older, newer = (
+        system.sample(span, "zoh") if span > 0.0 else None for span in (late, period - late)
+    )
+    after = np.eye(system.nstates) if newer is None else newer.A
+    size = system.nstates + n
+    a, b = np.zeros((size, size)), np.zeros(size)
+    a[:-n, :-n] = after @ older.A  # type: ignore[union-attr]
+    a[:-n, -n] = (after @ older.B)[:, 0]  # type: ignore[union-attr]
+    a[-n:-1, -n + 1 :] = np.eye(n - 1)
+    b[-1] = 1.0
+    if newer is not None and n > 1:
+        a[:-n, -n + 1] = newer.B[:, 0]
+    elif newer is not None:
+        b[:-n] = newer.B[:, 0]
+    return DiscreteSystem(a, b, np.append(system.C[0], np.zeros(n)), np.array(0.0), period)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,8 @@ In an arm the double pole only approximates a joint that oscillates and is coupl
 the base the error exceeds the bound of the design by a fifth, so that ``mu`` does not apply there.
 With the arm straight and without friction all six loops together are stable over the whole sector
 of gains, with 0.1 kg at the tip too, and at the nominal gain the sensitivity peaks at 1.24 (1.48
-with the 0.1 kg), where one stage has 1.02.
+with the 0.1 kg), where one stage has 1.02. The dead time of the regulators, 45 ms, is not in the
+design; behind it all of them are stable too, with peaks of 1.60 (2.12).
 
 Sources: packard1993; skogestad2005, chapter 8.
 """

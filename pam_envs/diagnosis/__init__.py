@@ -1,7 +1,5 @@
 """Diagnose model error from a recording; extend the plant; quantify the improvement."""
 
-from __future__ import annotations
-
 from typing import Any
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_readings"]

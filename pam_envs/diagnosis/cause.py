@@ -1,7 +1,5 @@
 """Cause of model error: an effect that a plain plant has switched off, and its signature."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -22,50 +20,25 @@ NEEDS = {
 
 @dataclass(frozen=True)
 class Term:
-    """A parameter of a form.
+    """A parameter of a form."""
 
-    Attributes
-    ----------
-    name : str
-        Dotted name of the plant's parameter.
-    starts : tuple of float
-        Starting values of fits [SI]; forms with several terms start at the i-th of each.
-    low, high : float, optional
-        Bounds narrower than those of the parameter's declaration.
-    scale : float, optional
-        Size of a meaningful change.
-    log : bool
-        Fitted on a logarithmic scale.
-    amount : bool
-        Whether the effect vanishes with it; other terms only shape the effect.
-    """
-
-    name: str
-    starts: tuple[float, ...]
-    low: float | None = None
+    name: str  # dotted name of the plant's parameter
+    starts: tuple[float, ...]  # starting values [SI]; several terms start at the i-th of each
+    low: float | None = None  # bounds narrower than those of the parameter's declaration
     high: float | None = None
-    scale: float | None = None
-    log: bool = False
-    amount: bool = True
+    scale: float | None = None  # size of a meaningful change
+    log: bool = False  # fitted on a logarithmic scale
+    amount: bool = True  # whether the effect vanishes with it; other terms only shape the effect
 
 
 @dataclass(frozen=True)
 class Form:
-    """One mathematical form of a cause.
+    """One mathematical form of a cause."""
 
-    Attributes
-    ----------
-    name : str
-        One or two words.
-    terms : tuple of Term
-        Its parameters.
-    search : callable, optional
-        Search for starting values from the base's fit, instead of ``Term.starts``
-        (:mod:`pam_envs.diagnosis.fit.starting_values`).
-    """
-
-    name: str
+    name: str  # one or two words
     terms: tuple[Term, ...]
+    # search for starting values from the base's fit, instead of those of the terms
+    # (pam_envs.diagnosis.fit.starting_values)
     search: Callable[..., Sequence[Sequence[float]]] | None = None
 
     @property
@@ -77,52 +50,25 @@ class Form:
 
 @dataclass(frozen=True)
 class Cause:
-    """An effect that a plant may lack.
+    """An effect that a plant may lack."""
 
-    Attributes
-    ----------
-    name : str
-        Name in the report.
-    title : str
-        Name in a sentence, "creep of the muscle".
-    forms : tuple of Form
-        Rival mathematical forms; the best one counts.
-    signature : str
-        Appearance in a residual.
-    neighbours : tuple of str
-        Causes with a similar signature.
-    experiment : str
-        Experiment that separates it from them.
-    source : str
-        Source of the physics.
-    needs : tuple of str
-        Requirements on a recording that can decide it: words of :data:`NEEDS`.
-    once : bool
-        Whether it happens once, so that held-out kinds of segment need not show it.
-    sensor : str
-        Sensor that would measure it directly.
-    contains : tuple of str
-        Causes that it contains as a limit: if both fit equally well the simpler one is named.
-    compensable : bool
-        Whether a controller that knows of it can reduce its effect on the true position; decided
-        before any controller was run.
-    settled : str
-        Why a table of settled readings cannot show it; ignored where such a table can
-        (:data:`pam_envs.diagnosis.static.models.TERMS`).
-    """
-
-    name: str
-    title: str
-    forms: tuple[Form, ...]
-    signature: str = ""
-    neighbours: tuple[str, ...] = ()
-    experiment: str = ""
-    source: str = ""
-    needs: tuple[str, ...] = ()
-    once: bool = False
-    sensor: str = ""
-    contains: tuple[str, ...] = ()
+    name: str  # in the report
+    title: str  # name in a sentence, "creep of the muscle"
+    forms: tuple[Form, ...]  # rival mathematical forms; the best one counts
+    signature: str = ""  # appearance in a residual
+    neighbours: tuple[str, ...] = ()  # causes with a similar signature
+    experiment: str = ""  # experiment that separates it from them
+    source: str = ""  # source of the physics
+    needs: tuple[str, ...] = ()  # words of NEEDS: requirements on a recording that can decide it
+    once: bool = False  # it happens once, so that held-out kinds of segment need not show it
+    sensor: str = ""  # sensor that would measure it directly
+    contains: tuple[
+        str, ...
+    ] = ()  # causes that are limits of it; of two equal fits theirs is named
+    # whether a controller that knows of it can reduce its effect on the true position; decided
+    # before any controller was run
     compensable: bool = False
+    # why a table of settled readings cannot show it; ignored where static.models.TERMS can
     settled: str = "settled readings have no time"
 
     def __post_init__(self) -> None:

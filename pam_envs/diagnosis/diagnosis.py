@@ -19,31 +19,20 @@ from pam_envs.diagnosis.audit.noise import ChannelFloor, Floor, noise_floor
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import selected
 from pam_envs.diagnosis.closed_loop import gain as loops
+from pam_envs.diagnosis.decide import isolability as iso
 from pam_envs.diagnosis.decide.held_out import HeldOut, choose, compared, hold_out, interleaved
-from pam_envs.diagnosis.decide.isolability import (
-    Isolability,
-    not_testable,
-    shortness_warning,
-    too_few_testable,
-)
+from pam_envs.diagnosis.decide.isolability import not_testable
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.structure import Regressors
 from pam_envs.diagnosis.decide.verdict import Decision, decide, effect_traces
 from pam_envs.diagnosis.experiment.experiment import propose, rival_of
 from pam_envs.diagnosis.experiment.plans import Means
+from pam_envs.diagnosis.fit import tolerance
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import calibrate
 from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, identified, inputs_of, start_plant
-from pam_envs.diagnosis.fit.tolerance import (
-    LOAD,
-    PAYLOAD_ERROR,
-    UNWEIGHED,
-    load_error_limit,
-    may_be_load,
-    refit_load,
-)
 from pam_envs.diagnosis.report.outcome import Diagnosis, Traces, steps
 from pam_envs.diagnosis.report.report import plain
 from pam_envs.diagnosis.report.summary import report_of
@@ -193,7 +182,7 @@ class Study:
     seed: int = 0
     causes: list[Cause] = field(default_factory=list)
     not_testable: dict[str, str] = field(default_factory=dict)
-    isolability: Isolability | None = None
+    isolability: iso.Isolability | None = None
     short: str = ""
     decision: Decision | None = None
     held: HeldOut | None = None
@@ -269,13 +258,17 @@ class Study:
         """Repeat the decision with loads refitted within their tolerance if they may explain it."""
         if self.decision is None:
             return
-        known, loads = self.sheet.tolerance.get(LOAD), self.recording.load / GRAVITY
-        limit = load_error_limit(loads, UNWEIGHED if known is None else known)
+        known, loads = self.sheet.tolerance.get(tolerance.LOAD), self.recording.load / GRAVITY
+        limit = tolerance.load_error_limit(loads, tolerance.UNWEIGHED if known is None else known)
         models = (self.decision.model, *self.decision.open_rivals)
-        at_stake = any(may_be_load(self.problem, self.blocks, m, loads, known) for m in models)
+        at_stake = any(
+            tolerance.may_be_load(self.problem, self.blocks, m, loads, known) for m in models
+        )
         if at_stake and np.isfinite(limit):
-            self.base = refit_load(self.problem, self.blocks, self.family, self.base, limit)
-            self.causes = [c for c in self.causes if c.name != PAYLOAD_ERROR]
+            self.base = tolerance.refit_load(
+                self.problem, self.blocks, self.family, self.base, limit
+            )
+            self.causes = [c for c in self.causes if c.name != tolerance.PAYLOAD_ERROR]
             self.decide()
 
     def decide(self) -> None:
@@ -283,8 +276,8 @@ class Study:
         moving = np.bincount(self.blocks.of, np.abs(np.diff(self.recording.command, prepend=0.0)))
         moved = int(np.sum(self.blocks.held_out & (moving > 0.0)))
         if moved < self.rule.least_blocks:
-            self.short = shortness_warning(moved, self.rule.least_blocks)
-        if self.short or too_few_testable(
+            self.short = iso.shortness_warning(moved, self.rule.least_blocks)
+        if self.short or iso.too_few_testable(
             len(self.causes), len(self.causes) + len(self.not_testable)
         ):
             self.decision = Decision("insufficient", self.base)

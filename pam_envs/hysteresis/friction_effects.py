@@ -42,8 +42,11 @@ def creep_step(
 
     ``state``, ``compliance`` and ``time`` are the first rows of the elements' state, compliances
     and time constants [s]; ``value`` is the quantity that they follow, over ``width`` seconds.
+    Elements without compliance in the whole tile stay behind.
     """
     for k in range(ELEMENTS):
+        if count_on(fixed[compliance + k], 0.0) == 0:
+            continue
         lag = rows[state + k]
         for j in range(first, last):
             kept = decay(width[j] / fixed[time + k][j])

@@ -325,19 +325,22 @@ def kinds() -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda kind: MODELS[kind].identity))
 
 
-def kind_of(choice: str, drive: str) -> str:
+def kind_of(choice: str, drive: str | None, usual: str = "length") -> str:
     """Return the kind of a choice of ``hysteresis=`` with a drive, ``DRIVES``.
 
-    A choice by itself stands for its models driven by pressure; a model that a plant file or a
-    script names by its kind stays what it is. Raises ValueError if there is none.
+    Without a drive it is the kind with the drive ``usual``, if there is one. A choice by itself
+    is the kind driven by pressure; a model that a plant file or a script names by its kind stays
+    what it is. Raises ValueError if there is none.
     """
-    if drive not in DRIVES:
+    if drive is not None and drive not in DRIVES:
         raise ValueError(f"hysteresis_drive = {drive!r}; choose 'length' or 'pressure'")
-    if drive == "pressure" or choice not in kinds() or MODELS[choice].identity:
+    if (drive or usual) == "pressure" or choice not in kinds() or MODELS[choice].identity:
         return choice
     for kind, model in MODELS.items():
-        if model.drive == drive and model.choice == choice:
+        if model.drive == (drive or usual) and model.choice == choice:
             return kind
+    if drive is None:
+        return choice
     raise ValueError(
         f"hysteresis = {choice!r} has no model driven by length: give hysteresis_drive='pressure'"
     )

@@ -19,6 +19,7 @@ density over ``c``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -27,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.checks import check_not_negative, check_thresholds, floats, width_of
-from pam_envs.hysteresis.elements import THRESHOLD, WEIGHT, move_plays, play
+from pam_envs.hysteresis.elements import THRESHOLD, WEIGHT, play
 from pam_envs.hysteresis.protocol import (
     ELEMENTS,
     HysteresisModel,
@@ -37,13 +38,15 @@ from pam_envs.hysteresis.protocol import (
     padded,
     register,
 )
-from pam_envs.kernels.build import kernel
+from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
 
 LIMIT = ELEMENTS
 """Row of the state, after the sliders, with the factor on the thresholds: the plant writes it."""
-STATE_ROWS = ELEMENTS + 1
+CELL = ELEMENTS + 1
+"""Row of scratch after it, with the cell of the input."""
+STATE_ROWS = ELEMENTS + 2
 LOW, PER_INPUT = WEIGHT, WEIGHT + 1
 """Rows of the numbers of curves: their first input, and cells per input."""
 
@@ -101,17 +104,32 @@ def straight_peek(
 
 
 @kernel
+def cell_of(u: float, curve: Any) -> int:
+    """Return the cell of a curve at ``u`` cells from its first knot; the end ones have no end."""
+    return max(0, min(int(u), len(curve) - 2))
+
+
+@kernel
 def curve_value(u: float, curve: Any) -> float:
     """Return a curve at ``u`` cells from its first knot, straight beyond its ends."""
-    i = max(0, min(int(u), len(curve) - 2))
+    i = cell_of(u, curve)
     return curve[i] + (u - i) * (curve[i + 1] - curve[i])  # type: ignore[no-any-return]
 
 
 @kernel
-def curve_slope(u: float, curve: Any) -> float:
-    """Return the slope of a curve, per cell."""
-    i = max(0, min(int(u), len(curve) - 2))
-    return curve[i + 1] - curve[i]  # type: ignore[no-any-return]
+def curved_ahead(
+    rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int, x: Any, lag: Any,
+    model: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Write the sum of all curves at the inputs, and the inputs' cells."""
+    low, per, members = fixed[model + LOW], fixed[model + PER_INPUT], counts[member]
+    cell = rows[at + CELL]
+    for j in range(first, last):
+        total = table[members[j]][elements]
+        u = (x[j] - low[j]) * per[j]
+        i = cell_of(u, total)
+        cell[j] = i
+        lag[j] = total[i] + (u - i) * (total[i + 1] - total[i])
 
 
 @kernel
@@ -124,15 +142,13 @@ def curved_lag(
     for m in range(operators):
         at = state + m * STATE_ROWS
         x, lag, limit = rows[x_at + m], rows[lag_at + m], rows[at + LIMIT]
-        for j in range(first, last):
-            lag[j] = 0.0
+        curved_ahead(rows, fixed, counts, table, elements, at, x, lag, model, member, first, last)
         for k in range(elements):
             threshold, position = fixed[model + THRESHOLD + k], rows[at + k]
             for j in range(first, last):
-                w, curve = play(x[j], threshold[j] * limit[j], position[j]), table[members[j]][k]
+                w = play(x[j], threshold[j] * limit[j], position[j])
                 position[j] = w
-                ahead = curve_value((x[j] - low[j]) * per[j], curve)
-                lag[j] = lag[j] + (ahead - curve_value((w - low[j]) * per[j], curve))
+                lag[j] = lag[j] - curve_value((w - low[j]) * per[j], table[members[j]][k])
 
 
 @kernel
@@ -146,18 +162,51 @@ def curved_peek(
     for m in range(operators):
         at = state + m * STATE_ROWS
         x, lag, stick = rows[x_at + m], rows[lag_at + m], rows[stick_at + m]
-        limit = rows[at + LIMIT]
+        limit, cell = rows[at + LIMIT], rows[at + CELL]
+        curved_ahead(rows, fixed, counts, table, elements, at, x, lag, model, member, first, last)
         for j in range(first, last):
-            lag[j] = 0.0
             stick[j] = 0.0
         for k in range(elements):
             threshold, position = fixed[model + THRESHOLD + k], rows[at + k]
             for j in range(first, last):
                 w, curve = play(x[j], threshold[j] * limit[j], position[j]), table[members[j]][k]
-                u = (x[j] - low[j]) * per[j]
-                behind = curve_value((w - low[j]) * per[j], curve)
-                lag[j] = lag[j] + (curve_value(u, curve) - behind)
-                stick[j] = stick[j] + (curve_slope(u, curve) * per[j] if w == position[j] else 0.0)
+                lag[j] = lag[j] - curve_value((w - low[j]) * per[j], curve)
+                i = int(cell[j])
+                rise = (curve[i + 1] - curve[i]) * per[j]
+                stick[j] = stick[j] + (rise if w == position[j] else 0.0)
+
+
+@kernel
+def slip_lag(
+    x: float, limit: float, thresholds: Any, curves: Any, low: float, per: float, sliders: Any
+) -> tuple[float, float]:
+    """Return the lag at an input and its slope, for sliders at positions that do not change.
+
+    ``thresholds``, shape (n,), and ``curves``, (n, knots), from ``low`` with ``per`` cells per
+    input, are those of :attr:`SlipModel.arrays`.
+    """
+    u = (x - low) * per
+    lag, slope = 0.0, 0.0
+    for k in range(len(thresholds)):
+        curve = curves[k]
+        i = cell_of(u, curve)
+        rise = curve[i + 1] - curve[i]
+        w = play(x, thresholds[k] * limit, sliders[k])
+        lag = lag + (curve[i] + (u - i) * rise - curve_value((w - low) * per, curve))
+        slope = slope + (rise * per if w == sliders[k] else 0.0)
+    return lag, slope
+
+
+@entry
+def slip_rows(
+    x: Array, limit: Array, thresholds: Array, curves: Array, low: float, per: float,
+    before: Array, lag: Array, after: Array,
+) -> None:  # fmt: skip
+    """Write the lags at inputs, shape (rows,), and the sliders, (rows, n), after ``before``."""
+    for r in range(len(x)):
+        lag[r] = slip_lag(x[r], limit[r], thresholds, curves, low, per, before[r])[0]
+        for k in range(len(thresholds)):
+            after[r][k] = play(x[r], thresholds[k] * limit[r], before[r][k])
 
 
 class SlipModel(HysteresisModel):
@@ -168,9 +217,20 @@ class SlipModel(HysteresisModel):
 
     thresholds: tuple[float, ...]
 
-    def _value(self, k: int, x: Array) -> Array:
-        """Return the curve of element ``k`` at inputs."""
+    @property
+    def curves(self) -> Array:
+        """The elements' curves at evenly spaced knots, shape (n, knots), straight beyond them."""
         raise NotImplementedError
+
+    @property
+    def grid(self) -> tuple[float, float]:
+        """First knot of the curves, and their cells per input."""
+        raise NotImplementedError
+
+    @cached_property
+    def arrays(self) -> tuple[Array, Array, float, float]:
+        """Thresholds, curves, first knot and cells per input, for kernels."""
+        return np.array(self.thresholds), np.ascontiguousarray(self.curves), *self.grid
 
     @property
     def shares(self) -> Array:
@@ -185,7 +245,8 @@ class SlipModel(HysteresisModel):
     @property
     def largest_lag(self) -> float:
         """Largest lag at any input, at the limit 1, to the width of a cell."""
-        return float(np.max(np.dot(self.thresholds, self.shares)))
+        cells = (np.array(self.thresholds)[:, None] * self.shares).T
+        return max(math.fsum(cell) for cell in cells)  # exact: the same on every processor
 
     def limited(self, limit: float) -> Self:
         """Return the model with its thresholds scaled."""
@@ -200,13 +261,14 @@ class SlipModel(HysteresisModel):
 
         ``limit``, shape (...), scales the thresholds. The states given do not change.
         """
-        x = np.asarray(x, float)
-        thresholds = np.asarray(limit, float)[..., None] * np.array(self.thresholds)
-        w = move_plays(x, thresholds, state)
-        total = np.zeros(w.shape[:-1])
-        for k in range(self.elements):
-            total = total + (self._value(k, x) - self._value(k, w[..., k]))
-        return total, w
+        x, limit, sliders = np.asarray(x, float), np.asarray(limit, float), np.asarray(state, float)
+        shape = np.broadcast_shapes(x.shape, limit.shape, sliders.shape[:-1])
+        n = (math.prod(shape), self.elements)
+        before = np.ascontiguousarray(np.broadcast_to(sliders, (*shape, n[1]))).reshape(n)
+        inputs, limits = (np.array(np.broadcast_to(v, shape)).reshape(-1) for v in (x, limit))
+        lag, after = np.empty(n[0]), np.empty(n)
+        slip_rows(inputs, limits, *self.arrays, before, lag, after)
+        return lag.reshape(shape), after.reshape(*shape, n[1])
 
     def step(self, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
         """Return the output, the input less its lag, and the state after it."""
@@ -283,8 +345,15 @@ class StraightSlip(SlipModel):
                 "neighbouring thresholds"
             )
 
-    def _value(self, k: int, x: Array) -> Array:
-        return np.asarray(self.weights[k] * x)
+    @property
+    def curves(self) -> Array:
+        """Straight lines, shape (n, 2)."""
+        return np.stack([np.zeros(self.elements), self.weights], axis=-1)
+
+    @property
+    def grid(self) -> tuple[float, float]:
+        """One cell from 0 to 1."""
+        return 0.0, 1.0
 
 
 @register
@@ -351,6 +420,11 @@ class PreisachSlip(SlipModel):
         return curves
 
     @property
+    def grid(self) -> tuple[float, float]:
+        """``low``, and the number of cells over the range."""
+        return self.low, len(self.densities[0]) / (self.high - self.low)
+
+    @property
     def shares(self) -> Array:
         """The densities, shape (n, cells)."""
         return np.array(self.densities)
@@ -363,12 +437,11 @@ class PreisachSlip(SlipModel):
     def numbers(self, full: float | None = None) -> list[float]:
         """Return the slope, the thresholds, the first input of the curves and cells per input."""
         idle = [0.0] * (ELEMENTS - self.elements)
-        per_input = len(self.densities[0]) / (self.high - self.low)
-        return padded([1.0, 0.0, *self.thresholds, *idle, self.low, per_input])
+        return padded([1.0, 0.0, *self.thresholds, *idle, *self.grid])
 
     def table_rows(self) -> Array:
-        """Return the curves."""
-        return self.curves
+        """Return the curves, and their sum in the last row."""
+        return np.concatenate([self.curves, self.curves.sum(axis=0)[None]])
 
     def check(self, usage: Usage) -> None:
         """Refuse a range that is too small."""
@@ -377,9 +450,3 @@ class PreisachSlip(SlipModel):
                 f"hysteresis: the densities span up to {self.high:g} and {usage.plant} needs "
                 f"{usage.reach:g}: give a wider range"
             )
-
-    def _value(self, k: int, x: Array) -> Array:
-        curve = self.curves[k]
-        u = (x - self.low) * ((len(curve) - 1) / (self.high - self.low))
-        i = np.clip(u.astype(int), 0, len(curve) - 2)
-        return np.asarray(curve[i] + (u - i) * (curve[i + 1] - curve[i]))

@@ -11,8 +11,6 @@ hysteresis leaves the rest of the plant unchanged. Friction driven by length is 
 static law (:mod:`~pam_envs.identification.length_friction`).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -39,12 +37,10 @@ _START = np.array([8.7e-4, 106.0, 0.0168, 2250.0, 8000.0, 0.12, *[1 / 6] * 6, 0.
 _LOW = np.array([1e-4, 1.0, 0.006, 100.0, 0.0, 0.10, *[0.0] * 6, -0.7, -0.15])
 _HIGH = np.array([5e-3, 2e3, 0.2, 2e4, 1e6, 0.90, *[5.0] * 6, 0.7, 0.05])
 _SCALE = np.array([6e-4, 100.0, 0.02, 1e3, 1e4, 0.1, *[0.2] * 6, 0.3, 0.05])
-WIDTH_WEIGHT = 2.0
-"""A loop width counts as much as this many readings (times their weight)."""
+WIDTH_WEIGHT = 2.0  # a loop width counts as much as this many readings (times their weight)
 PRIOR_WEIGHT = 0.1
 """Penalty [mm] on a threshold's share of the weight that is twice, or none of, the prior's."""
-LEVELS = 49
-"""Levels of the Everett map from -6 to 6 bar: one every 0.25 bar."""
+LEVELS = 49  # levels of the Everett map from -6 to 6 bar: one every 0.25 bar
 _LEAST_SLOPE = 0.1
 _SOURCE = "identified on positioning2021, Tables 3-5"
 
@@ -309,15 +305,12 @@ def repeatability_floor(table: ContractionTable) -> float:
 
 @dataclass(frozen=True)
 class Identifiability:
-    """Identifiability of a plant's parameters from the cycles.
-
-    ``rank`` is the number of independent combinations that the means determine to better than a
-    fifth (one standard deviation), ``fixed`` the share of each parameter in them, from 0 to 1.
-    """
+    """Identifiability of a plant's parameters from the cycles."""
 
     names: tuple[str, ...]
+    # combinations that the means determine to better than a fifth (one standard deviation)
     rank: int
-    fixed: Array
+    fixed: Array  # share of each parameter in them, from 0 to 1
 
 
 def identifiability(fit: CyclesFit, standard_error: float = 6.7e-5) -> Identifiability:

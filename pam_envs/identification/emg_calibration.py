@@ -8,8 +8,6 @@ eighth-order low-pass, 0.16 s late, and in stance alone, no constant of reading 
 published -36 % for the walk of this package (-32 % at best).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

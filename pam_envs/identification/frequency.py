@@ -12,8 +12,6 @@ IEEE Trans. Power Delivery 14 (1999); B. Gustavsen, "Improving the pole relocati
 vector fitting", IEEE Trans. Power Delivery 21 (2006).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,21 +26,11 @@ ROUNDS = 60
 
 @dataclass(frozen=True)
 class RationalFit:
-    """A strictly proper, stable transfer function, and how well it fits.
+    """A strictly proper, stable transfer function, and how well it fits."""
 
-    Parameters
-    ----------
-    poles : ndarray of complex, shape (n,)
-        [rad/s], complex ones in neighbouring conjugate pairs.
-    residues : ndarray of complex, shape (n,)
-        [output per input, times rad/s].
-    relative_error : float
-        Root mean square of ``abs(fit - measured) / abs(measured)``.
-    """
-
-    poles: Complex
-    residues: Complex
-    relative_error: float
+    poles: Complex  # (n,) [rad/s], complex ones in neighbouring conjugate pairs
+    residues: Complex  # (n,) [output per input, times rad/s]
+    relative_error: float  # RMS of abs(fit - measured) / abs(measured)
 
     @property
     def static_gain(self) -> float:
@@ -75,24 +63,12 @@ def fit_rational(
 ) -> RationalFit:
     """Return the stable transfer function of some order that is nearest to a response.
 
-    Parameters
-    ----------
-    frequency : array_like, shape (m,)
-        Angular frequencies [rad/s], above 0.
-    response : array_like of complex, shape (m,)
-        Output per input.
-    order : int
-        Number of poles.
-    relative_degree : int
-        Poles less zeros, from 1 to ``order``. Without it a fit may put needless zeros beyond the
-        measured range, in the right half-plane too, where no controller can be recovered.
-    weight : array_like, shape (m,), optional
-        Weight of each point; ``1 / abs(response)``, errors relative to the response, if not given.
-
-    Raises
-    ------
-    ValueError
-        If the shapes do not agree, or there are too few frequencies for the order.
+    ``frequency`` (m,) [rad/s] is above 0, ``response`` (m,) complex, output per input; ``weight``
+    (m,) is ``1 / abs(response)`` by default, for errors relative to the response.
+    ``relative_degree``, poles less zeros, is from 1 to ``order``: without it a fit may put needless
+    zeros beyond the measured range, in the right half-plane too, where no controller can be
+    recovered. A ValueError says that the shapes do not agree, or that there are too few frequencies
+    for the order.
     """
     w, values = np.asarray(frequency, float), np.asarray(response, complex)
     _check(w, values, order, relative_degree)

@@ -7,8 +7,6 @@ the knots. Forces and centres of pressure are used as spline coefficients, which
 about 1 % of a stride and keeps zero zero.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Mapping
@@ -24,8 +22,7 @@ from pam_envs.references.gait import ACTIVITIES, FOLDER, SIGNALS
 Array = NDArray[np.float64]
 
 POINTS = 100
-SHANK = 0.43
-"""Length of the shank [m] of the subject, knee to ankle."""
+SHANK = 0.43  # length of the shank [m] of the subject, knee to ankle
 HARMONICS = 8
 SHIFT = {"low": -0.06, "high": 0.2}
 """Range of the centre of pressure on the sole [m ahead of the ankle]."""

@@ -23,8 +23,6 @@ exact inverse is :meth:`~pam_envs.hysteresis.preisach.Preisach.inverse_step`;
 :func:`series_inverse` serves as a comparison.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -36,12 +34,7 @@ from scipy.optimize import brentq
 from pam_envs.hysteresis import everett as maps
 from pam_envs.hysteresis.everett import everett
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.identification.preisach_forc import (
-    congruency_error,
-    curve_inputs,
-    descending_curves,
-    preisach_from_curves,
-)
+from pam_envs.identification import preisach_forc as forc
 
 Array = NDArray[np.float64]
 Rig = Callable[[Array], Array]
@@ -56,28 +49,15 @@ INSIDE = 0.7
 
 @dataclass(frozen=True)
 class JointHysteresis:
-    """Result of the test.
+    """Result of the test."""
 
-    Attributes
-    ----------
-    model : Preisach
-        Operator of the map. A symmetric map is made exactly symmetric, and the operator starts
-        virgin; any other map is used as measured, and the operator starts at the low end.
-    symmetry : float
-        Largest ``abs(E(a, b) - E(-b, -a))`` over the largest entry of the map.
-    congruency : float
-        Largest difference of two loops between the same inputs, over the height of a loop.
-    wiping_out : float
-        Largest distance of a closed loop's end from its beginning, over its height.
-    clipped : float
-        Weight of the relays that came out negative, as a part of all weight.
-    """
-
+    # operator of the map; a symmetric map is made exactly symmetric, and the operator starts
+    # virgin, any other map is used as measured, and the operator starts at the low end
     model: Preisach
-    symmetry: float
-    congruency: float
-    wiping_out: float
-    clipped: float
+    symmetry: float  # largest abs(E(a, b) - E(-b, -a)) over the largest entry of the map
+    congruency: float  # largest difference of two loops of the same inputs, over a loop's height
+    wiping_out: float  # largest distance of a closed loop's end from its beginning, over its height
+    clipped: float  # weight of the relays that came out negative, as a part of all weight
 
     @property
     def symmetric(self) -> bool:
@@ -109,30 +89,16 @@ class JointHysteresis:
 
 
 def measure_joint(rig: Rig, amplitude: float, levels: int = 21) -> JointHysteresis:
-    """Return the hysteresis of a joint between ``-amplitude`` and ``amplitude`` [rad].
-
-    ``rig`` maps setpoints [rad] to angles at rest [rad], each of shape (T,); ``levels`` is the
-    number of levels of the grid; see :func:`measure_hysteresis`.
-    """
+    """Return the hysteresis of a joint between ``-amplitude`` and ``amplitude`` [rad]."""
     return measure_hysteresis(rig, -amplitude, amplitude, levels)
 
 
 def measure_hysteresis(rig: Rig, low: float, high: float, levels: int = 21) -> JointHysteresis:
-    """Return the hysteresis of a rig, in units of its input and output.
+    """Return the hysteresis of a rig between two inputs, in units of its input and output.
 
-    Parameters
-    ----------
-    rig : callable
-        From inputs to outputs, shape (T,); every call begins in the rig's own start state.
-    low, high : float
-        Range of the input.
-    levels : int
-        Levels of the grid.
-
-    Raises
-    ------
-    ValueError
-        If the range is empty, or the rig does not return one finite number an input.
+    ``rig`` maps inputs to outputs, shape (T,), and begins every call in its own start state;
+    ``levels`` are those of the grid. A ValueError says that the range is empty, or that the rig
+    does not return one finite number an input.
     """
     if not low < high or levels < 3:
         raise ValueError(
@@ -140,11 +106,11 @@ def measure_hysteresis(rig: Rig, low: float, high: float, levels: int = 21) -> J
             " least 3: widen the range"
         )
     up = np.linspace(low, high, levels)  # the major loop, then the first-order curves
-    sweep = np.concatenate([up, up[-2::-1], curve_inputs(low, high, levels)[1:]])
+    sweep = np.concatenate([up, up[-2::-1], forc.curve_inputs(low, high, levels)[1:]])
     outputs = _answers(rig, sweep)
-    curves = descending_curves(sweep, outputs)
+    curves = forc.descending_curves(sweep, outputs)
     first = float(outputs[2 * (levels - 1)])
-    fit = preisach_from_curves(curves, low, high, levels, start_output=first)
+    fit = forc.preisach_from_curves(curves, low, high, levels, start_output=first)
     symmetry = maps.symmetry_error(fit.model.everett)
     congruency, wiping_out = _loops(rig, low, high, levels)
     model = symmetrised(fit.model) if symmetry <= SYMMETRY else fit.model
@@ -152,10 +118,7 @@ def measure_hysteresis(rig: Rig, low: float, high: float, levels: int = 21) -> J
 
 
 def symmetrised(model: Preisach) -> Preisach:
-    """Return the operator with each relay's weight the mean of its own and its mirror image's.
-
-    Its input and output are counted from mid-range, and it starts virgin.
-    """
+    """Return the operator with the mean weights of mirrored relays, from mid-range, virgin."""
     weights = model.weights
     mean = np.tril(0.5 * (weights + weights[::-1, ::-1].T))
     half = 0.5 * (model.high - model.low)
@@ -179,7 +142,7 @@ def _loops(rig: Rig, low: float, high: float, levels: int) -> tuple[float, float
     for ends in LOOPS:
         a, b = (middle + half * end for end in ends)
         records = [_loop(rig, path, cell) for path in ((low, b, a, b, a), (low, high, a, b, a))]
-        congruency = max(congruency, congruency_error(records))
+        congruency = max(congruency, forc.congruency_error(records))
         for _, outputs in records:
             wiping_out = max(wiping_out, abs(outputs[-1] - outputs[0]) / float(np.ptp(outputs)))
     return congruency, wiping_out

@@ -4,8 +4,6 @@ The hysteresis of two equal antagonists is symmetric. That of a single muscle is
 grows with its pressure, and its contraction saturates as it rises.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +15,7 @@ from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 Array = NDArray[np.float64]
 
-LOWEST, HIGHEST = -0.1, 0.4
-"""Contractions between which a muscle rests."""
+LOWEST, HIGHEST = -0.1, 0.4  # contractions between which a muscle rests
 
 
 @dataclass(frozen=True)
@@ -38,10 +35,7 @@ class HangingMuscle:
             )
 
     def rest_contractions(self, pressures: ArrayLike) -> Array:
-        """Return the contraction [1] at rest after each of a series of pressures [Pa], (T,).
-
-        From the contraction of the straight joint, where its hysteresis is virgin.
-        """
+        """Return the contractions [1] at rest after pressures [Pa], (T,), from the virgin state."""
         held, operator = self.plant.hysteresis, self.plant.hysteresis.model
         middle = float(self.plant.lever.contraction(0.0, self.plant.muscle.rest_length)[0])
         state, made = operator.initial_state(), []

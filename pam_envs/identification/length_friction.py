@@ -26,10 +26,8 @@ Array = NDArray[np.float64]
 
 THRESHOLDS = np.array([0.002, 0.004, 0.008, 0.014, 0.022, 0.035])
 """Strains at which the elements slip, at the limit 1; the readings are about 1 % apart."""
-SPAN = (-0.06, 0.18)
-"""Range of strain of the cells."""
-CELLS = {StraightSlip.kind: 1, PreisachSlip.kind: 8}
-"""Cells of the stiffnesses over strain."""
+SPAN = (-0.06, 0.18)  # range of strain of the cells
+CELLS = {StraightSlip.kind: 1, PreisachSlip.kind: 8}  # cells of the stiffnesses over strain
 PRIOR_WEIGHT = 0.3
 """Penalty [mm] on neighbouring elements, or cells, that differ by a factor of 2.7."""
 NAMES = ("area", "braid_force", "braid_strain", "stiffness", "hardening", "area_taper")
@@ -37,8 +35,7 @@ _START = (8.3e-4, 95.0, 0.0155, 2200.0, 4000.0, 0.5, 0.2e-5, -0.05)
 _LOW = (1e-4, 1.0, 0.006, 100.0, -2e4, 0.0, -1e-6, -0.15)
 _HIGH = (5e-3, 2e3, 0.2, 2e4, 1e6, 6.0, 3e-5, 0.3)
 _SCALE = (6e-4, 100.0, 0.02, 1e3, 1e4, 1.0, 1e-6, 0.05)
-_FORCE = 4.0
-"""Slip force of an element [N] from which the fit starts."""
+_FORCE = 4.0  # slip force of an element [N] from which the fit starts
 _BISECTIONS, _STEP = 40, 0.06
 
 
@@ -109,18 +106,10 @@ def fit_length_friction(
 ) -> SingleMuscle:  # fmt: skip
     """Return the muscle with friction driven by length that fits mean cycles.
 
-    Parameters
-    ----------
-    pressures, loads, contractions : array
-        Shapes (T,) [Pa], (m,) [kg] and (m, T) [m].
-    widest : array of int, shape (m,)
-        Samples after the highest pressure at which the loop of each load is widest.
-    kind : str
-        Kind of the operator, one of ``CELLS``.
-    width_weight : float
-        Weight of a loop width over that of a reading.
-    shares : array, shape (n,), optional
-        Prior shares of the elements in the slip force, equal by default.
+    Pressures (T,) [Pa], loads (m,) [kg], contractions (m, T) [m]; ``widest`` (m,) are the samples
+    after the highest pressure at which the loop of each load is widest. ``kind`` is that of the
+    operator, one of ``CELLS``; ``width_weight`` the weight of a loop width over that of a reading;
+    ``shares`` (n,) are prior shares of the elements in the slip force, equal by default.
     """
     base, cells = SingleMuscle(), CELLS[kind]
     length, turn, rows = base.muscle.rest_length, int(np.argmax(pressures)), np.arange(len(loads))

@@ -1,7 +1,5 @@
 """Identification of the shipped MAS-10-N-100 plants from the shipped readings, and its report."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

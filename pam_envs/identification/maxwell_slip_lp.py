@@ -27,8 +27,6 @@ yeh2010, section 3.1. T.-J. Yeh, S.-W. Lu, T.-Y. Wu, "Modeling and identificatio
 piezoelectric actuators", J. Dyn. Sys., Meas., Control 128 (2006).
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -51,10 +49,8 @@ LEAST_SLOPE = 1e-3
 WEAKEST = 1.2e-3
 """Least singular value of the equations, over the largest, that counts: smaller ones would amplify
 the noise of a record almost a thousandfold."""
-OPEN = 0.05
-"""Least part of an open element in an undetermined combination."""
-AT_ZERO = 0.02
-"""Part of the largest stiffness within which a loop's bottom counts as 0."""
+OPEN = 0.05  # least part of an open element in an undetermined combination
+AT_ZERO = 0.02  # part of the largest stiffness within which a loop's bottom counts as 0
 
 
 class OpenParameters(UserWarning):
@@ -63,26 +59,15 @@ class OpenParameters(UserWarning):
 
 @dataclass(frozen=True)
 class SlipFit:
-    """Identified model and its identifiability.
+    """Identified model and its identifiability."""
 
-    Attributes
-    ----------
-    model : ModifiedMaxwellSlip
-        Among all optimal models, the one with the least friction.
-    objective, relative_objective : float
-        Sum of the absolute errors at the break points [Pa], and over the largest pressure.
-    rank, unknowns : int
-        Rank of the equations, and ``2 N + 1``: ``k_1 .. k_N`` and ``g_0 .. g_N``.
-    open : tuple of str
-        Names of the undetermined stiffnesses. ``k_N`` is always one of them: the last element never
-        slips, and acts as a part of the spring.
-    """
-
-    model: ModifiedMaxwellSlip
-    objective: float
-    relative_objective: float
-    rank: int
-    unknowns: int
+    model: ModifiedMaxwellSlip  # among all optimal models, the one with the least friction
+    objective: float  # sum of the absolute errors at the break points [Pa]
+    relative_objective: float  # the same over the largest pressure
+    rank: int  # of the equations
+    unknowns: int  # 2 N + 1: k_1 .. k_N and g_0 .. g_N
+    # names of the undetermined stiffnesses; k_N is always one of them: the last element never
+    # slips, and acts as a part of the spring
     open: tuple[str, ...]
 
     @property
@@ -103,26 +88,13 @@ class SlipFit:
 
 
 def fit_slip_programme(loops: Sequence[Loop], elements: int = 10) -> SlipFit:
-    """Return the modified Maxwell-slip model that is nearest to some loops.
+    """Return the modified Maxwell-slip model with ``elements`` that is nearest to some loops.
 
-    Parameters
-    ----------
-    loops : sequence of (pressure, stiffness) pairs, shapes (T,)
-        One loop each [Pa] and [N/m], from rest at pressure 0 after a larger loop, up to a peak
-        and back. The one with the largest stiffness is the major loop.
-    elements : int
-        Number of elements ``N``.
-
-    Warns
-    -----
-    OpenParameters
-        If more than the split between the last element and the spring is undetermined; the message
-        names the parameters.
-
-    Raises
-    ------
-    ValueError
-        Without a loop, for one that does not begin at rest, or without a solution.
+    Each loop is a pair of pressure [Pa] and stiffness [N/m], shapes (T,), from rest at pressure 0
+    after a larger loop, up to a peak and back; the one with the largest stiffness is the major
+    loop. Warns :class:`OpenParameters`, with their names, if more than the split between the last
+    element and the spring is undetermined. A ValueError says that there is no loop, that one does
+    not begin at rest, or that there is no solution.
     """
     found = _solution(loops, elements, "corrected")
     rank, names = _fixed(found.rows, elements)
@@ -138,10 +110,7 @@ def fit_slip_programme(loops: Sequence[Loop], elements: int = 10) -> SlipFit:
 
 
 def printed_programme(loops: Sequence[Loop], elements: int = 10) -> tuple[float, Array]:
-    """Return the relative objective and the spring (N + 1,) [Pa] of the equations as printed.
-
-    The spring does not rise, so that no model can be made of it.
-    """
+    """Return relative objective and spring (N + 1,) [Pa], which does not rise, as printed."""
     found = _solution(loops, elements, "printed")
     return found.objective / found.full, found.spring
 

@@ -13,8 +13,6 @@ I. D. Mayergoyz, "Mathematical Models of Hysteresis", Springer 1991, section 1.2
 first-order curves; congruency and wiping out as necessary and sufficient conditions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -86,42 +84,24 @@ Curve = tuple[ArrayLike, ArrayLike]
 
 @dataclass(frozen=True)
 class CurveFit:
-    """Operator read off first-order curves.
-
-    ``clipped`` is the share of relay weight that came out negative and was set to 0: 0 for curves
-    of a Preisach operator, and a measure of noise or misfit otherwise.
-    """
+    """Operator read off first-order curves."""
 
     model: Preisach
+    # share of relay weight that came out negative and was set to 0, by noise or misfit
     clipped: float
 
 
 @dataclass(frozen=True)
 class PreisachFit:
-    """Operator fitted to a record, and its identifiability.
+    """Operator fitted to a record, and its identifiability."""
 
-    Attributes
-    ----------
-    model : Preisach
-        The operator; its output includes the fitted constant (``start_output``) unless the start
-        is virgin.
-    offset, rms : float
-        The constant (output in the start state), and RMS residual, in the unit of the output.
-    rank, unknowns : int
-        Rank of the regressors (one per cell, and the constant), and number of cells plus 1.
-    decided : ndarray, shape (n - 1, n - 1)
-        Share of each cell's weight that the record determines, from 0 (all prior) to 1.
-    prior : ndarray, shape (n - 1, n - 1)
-        Relay weights of the prior.
-    """
-
-    model: Preisach
-    offset: float
-    rms: float
-    rank: int
-    unknowns: int
-    decided: Array
-    prior: Array
+    model: Preisach  # its output includes the constant (start_output) unless the start is virgin
+    offset: float  # the constant (output in the start state), in the unit of the output
+    rms: float  # of the residual
+    rank: int  # of the regressors: one per cell, and the constant
+    unknowns: int  # number of cells plus 1
+    decided: Array  # (n - 1, n - 1): share of each weight that the record determines, 0 all prior
+    prior: Array  # (n - 1, n - 1): relay weights of the prior
 
 
 def curve_inputs(low: float, high: float, levels: int, points: int = 1) -> Array:
@@ -171,27 +151,11 @@ def preisach_from_curves(
 ) -> CurveFit:
     """Return the Preisach operator of first-order descending curves.
 
-    Parameters
-    ----------
-    curves : sequence of (x, y) pairs
-        Each begins at a turn on the ascending major branch and falls to ``low``. There must be
-        one from every level of the grid above ``low``, in any order.
-    low, high : float
-        Range of the input.
-    levels, depth : int
-        Levels of the grid, and extrema that the operator keeps.
-    start_output : float
-        Output at ``low``.
-
-    Returns
-    -------
-    CurveFit
-        The operator, ``E(alpha, beta) = y(turn at alpha) - y(beta)``, negative weights set to 0.
-
-    Raises
-    ------
-    ValueError
-        If a level has no curve (the message names it), or a curve does not reach ``low``.
+    Each of the ``curves``, (x, y) pairs, begins at a turn on the ascending major branch and falls
+    to ``low``; there must be one from every one of the ``levels`` of the grid above ``low``, in any
+    order. ``depth`` is the number of extrema that the operator keeps, ``start_output`` the output
+    at ``low``. The map is ``E(alpha, beta) = y(turn at alpha) - y(beta)``, negative weights set to
+    0. A ValueError names a level without a curve, or a curve that does not reach ``low``.
     """
     points = np.linspace(low, high, levels)
     rising = np.zeros((levels, levels))
@@ -235,22 +199,11 @@ def fit_preisach(
 ) -> PreisachFit:
     """Return the Preisach operator, plus a constant, that is nearest to a record.
 
-    Parameters
-    ----------
-    x, y : array_like, shape (T,)
-        Input and output, from the start state on.
-    low, high : float
-        Range of the input; inputs beyond it count as its ends.
-    levels : int
-        Levels of the grid: ``levels (levels - 1) / 2`` unknown weights.
-    depth : int
-        Extrema that are kept.
-    start : {"low", "virgin"}
-        State before the first sample. A virgin start makes the weights symmetric, ``mu(a, b) =
-        mu(-b, -a)``, and needs ``low = -high``.
-    prior_weight : float
-        Penalty on the distance from the prior, relative to the largest singular value of the
-        regressors; above 0.
+    Input ``x`` and output ``y``, shape (T,), are from the ``start`` state on; inputs beyond ``low``
+    and ``high`` count as these. The grid has ``levels``, that is ``levels (levels - 1) / 2``
+    unknown weights, and ``depth`` extrema are kept. A virgin start makes the weights symmetric,
+    ``mu(a, b) = mu(-b, -a)``, and needs ``low = -high``. ``prior_weight``, above 0, is the penalty
+    on the distance from the prior, relative to the largest singular value of the regressors.
     """
     inputs, outputs = measured(x, y)
     if not prior_weight > 0.0:
@@ -306,23 +259,11 @@ def _drawn(columns: Array, y: Array, prior: Array, strength: float) -> Array:
 def congruency_error(loops: Sequence[Curve]) -> float:
     """Return the error of congruency of minor loops between the same two inputs.
 
-    Parameters
-    ----------
-    loops : sequence of (x, y) pairs
-        At least two records of the same closed excursion of the input, with different histories,
-        each from the same turn on.
-
-    Returns
-    -------
-    float
-        Largest difference between two loops after moving their first points together, over the
-        largest height of a loop: 0 (to rounding) for a Preisach operator. Creep, or a width that
-        depends on the level of the output, increases it.
-
-    Raises
-    ------
-    ValueError
-        For fewer than two loops, or loops between different inputs.
+    ``loops`` are at least two records, (x, y) pairs, of the same closed excursion of the input with
+    different histories, each from the same turn on. The error is the largest difference between two
+    loops after moving their first points together, over the largest height of a loop: 0 (to
+    rounding) for a Preisach operator; creep, or a width that depends on the level of the output,
+    increases it. A ValueError says that there are fewer than two loops, or different inputs.
     """
     records = [measured(x, y) for x, y in loops]
     if len(records) < 2:

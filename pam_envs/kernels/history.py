@@ -20,3 +20,10 @@ def note(rows: Any, ring: int, j: int, step: int, value: float) -> None:
 def noted(rows: Any, ring: int, j: int, step: int, back: int) -> float:
     """Return the value of ``back`` control periods before ``step``, at most ``N_HISTORY - 1``."""
     return rows[ring + ((step + N_HISTORY - back) & (N_HISTORY - 1))][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def fill_ring(rows: Any, ring: int, j: int, value: float) -> None:
+    """Begin the ring of a signal that was constant."""
+    for k in range(N_HISTORY):
+        rows[ring + k][j] = value

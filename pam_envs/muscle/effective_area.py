@@ -4,19 +4,22 @@
 
 with effective pressure ``w`` [Pa] and strain ``e`` (contraction over rest length, negative when
 stretched). The area term is the virtual-work force of a McKibben muscle about its rest length
-(its area shrinks as it shortens: ``c``); the bracket is the force of tube and braid at no
+(its area shrinks as it shortens: ``c``), and the volume is that whose change is this area; the
+bracket is the force of tube and braid at no
 pressure, whose saturating part gives the threshold pressure of a short muscle. The same two terms,
 with a Gaussian taper, fit published isometric maps of 10 mm muscles.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
 from pam_envs.muscle.effects import (
     LengthCreepEffects,
@@ -51,7 +54,9 @@ class EffectiveAreaMuscle(
 
     rest_length: float = published(0.1, "m", 0.02, 2.0, "positioning2021, Table 1: MAS-10-N-100")
     diameter: float = published(0.01, "m", 0.003, 0.1, "positioning2021, Table 1: MAS-10-N-100")
-    braid_angle: float = assumed(0.499, "rad", 0.2, 0.9, "DMSP-10-250 (public model code)")
+    braid_angle: float = assumed(
+        0.499, "rad", 0.2, 0.9, "for drawings: DMSP-10-250 (public model code)"
+    )
     area: float = identified(8.7e-4, "m2", 1e-5, 2e-2, _FIT)
     area_taper: float = identified(0.0, "1", 0.0, 6.0, _FIT, neutral=0.0)
     braid_force: float = identified(106.0, "N", 0.0, 5e3, _FIT)
@@ -130,10 +135,16 @@ def tension_slope(
 
 
 @kernel
-def volume(strain: float, rest_length: float, tall: float, cosine: float) -> float:
-    """Return the inner volume [m3]; ``tall`` is pi D^2 / (4 sin^2 angle), ``cosine`` its cosine."""
-    ratio = (1.0 - strain) * cosine
-    return tall * rest_length * (1.0 - strain) * (1.0 - ratio * ratio)
+def volume(
+    strain: float, rest_length: float, diameter: float, area: float, taper: float, curve: float
+) -> float:
+    """Return the inner volume [m3], by virtual work: its change with length is the area.
+
+    ``diameter`` [m] is that of the bore at rest.
+    """
+    bore = 0.25 * math.pi * diameter * diameter
+    grown = area * strain * (1.0 - (0.5 * taper + curve * strain / 3.0) * strain)
+    return rest_length * (bore + grown)
 
 
 @kernel
@@ -151,3 +162,22 @@ def fine_slope(
 ) -> float:
     """Return minus the derivative of :func:`fine_tension` with respect to strain [N]."""
     return 2.0 * (area * curve * drive + k2 + 2.0 * k4 * strain * strain) * strain
+
+
+@kernel
+def law_and_slope(
+    drive: float, middle: float, strain: float, stiffer: float, area: float, taper: float,
+    force: float, braid_strain: float, k1: float, k3: float, curve: float, k2: float, k4: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the force [N] of the static law with its finer terms, at an effective pressure [Pa].
+
+    Then minus its derivative by strain [N] at another one, ``middle``. ``stiffer`` is a factor on
+    the passive force, and ``k1`` to ``k4`` are its coefficients by the power of strain.
+    """
+    force, k1, k3 = force * stiffer, k1 * stiffer, k3 * stiffer
+    k2, k4 = k2 * stiffer, k4 * stiffer
+    slack = decay(strain / braid_strain)
+    pull = tension(drive, strain, slack, area, taper, force, k1, k3)
+    slope = tension_slope(middle, strain, slack, area, taper, force / braid_strain, k1, k3)
+    pull = pull + fine_tension(drive, strain, area, curve, k2, k4)
+    return pull, slope + fine_slope(middle, strain, area, curve, k2, k4)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pam_envs.kernels.arithmetic import decay, sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed, published
-from pam_envs.pneumatics.regulator import DelayedEffects
+from pam_envs.pneumatics.regulator import RegulatorEffects, usual_dead_time, usual_slew_rate
 
 NUMERATOR = ((1.0, 17.45, 75.79), (1.0, 7.39, 13.41))
 DENOMINATOR = ((0.0, 1.0, 12.33), (1.0, 17.97, 78.51), (1.0, 13.78, 47.43), (1.0, 8.11, 17.12))
@@ -30,22 +30,23 @@ MODES = REAL_MODES + 2
 
 
 @dataclass(frozen=True)
-class OrthosisRegulator(DelayedEffects):
-    """Electronic pressure valve (SMC ITV1031): a first-order lag with a limited rate.
+class OrthosisRegulator(RegulatorEffects):
+    """Electronic pressure valve (SMC ITV1031): dead time, limited rate, first-order lag.
 
     A plant with ``dynamics="measured"`` has the paper's frequency response instead.
     """
 
     max_pressure: float = published(4.5e5, "Pa", 1e4, 1.2e6, "yeh2010, section 5.2: of the muscle")
+    dead_time: float = usual_dead_time()
     time_constant: float = assumed(
         0.0425,
         "s",
         0.002,
         2.0,
-        "gives the published 2.07 % of the inverse alone",
+        "gives the published 2.07 % of the inverse alone, without dead time and rate limit",
         spread=(0.035, 0.1),
     )
-    slew_rate: float = assumed(1e9, "Pa/s", 1e4, 1e9, "not published; no limit", neutral=1e9)
+    slew_rate: float = usual_slew_rate()
 
 
 def roots(factor: tuple[float, float, float]) -> tuple[complex, ...]:

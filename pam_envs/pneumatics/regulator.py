@@ -145,13 +145,18 @@ class RegulatorEffects(LineEffects, SupplyEffects, ValveEffects):
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class DelayedEffects(RegulatorEffects):
-    """The same with a dead time, of regulators whose plain model has none."""
+def usual_dead_time() -> float:
+    """Return the dead time of a regulator that was measured, for regulators of its class."""
+    return assumed(
+        0.045, "s", 0.0, 0.11, "45 ms: DMSP-10-250 record, SMC ITV", neutral=0.0, spread=(0.02, 0.1)
+    )
 
-    effects: ClassVar[tuple[tuple[str, ...], ...]] = (("dead_time",), *RegulatorEffects.effects)
 
-    dead_time: float = effect("s", 0.0, 0.11, "of the setpoint")
+def usual_slew_rate() -> float:
+    """Return the slew rate of a regulator that was measured, for regulators of its class."""
+    return assumed(
+        6.8e5, "Pa/s", 1e4, 1e9, "DMSP-10-250 record, raw step", neutral=1e9, spread=(4e5, 1.2e6)
+    )
 
 
 @dataclass(frozen=True)
@@ -167,22 +172,19 @@ class Regulator(RegulatorEffects):
     max_pressure: float = published(
         6e5, "Pa", 1e4, 1.2e6, "positioning2021, section 3.2: 0 to 6 bar"
     )
-    dead_time: float = assumed(
-        0.045, "s", 0.0, 0.11, "45 ms: DMSP-10-250 record, SMC ITV", neutral=0.0, spread=(0.02, 0.1)
-    )
+    dead_time: float = usual_dead_time()
     time_constant: float = assumed(
         0.05, "s", 0.002, 2.0, "DMSP-10-250 record; 83 ms: SMC ITV", spread=(0.035, 0.12)
     )
-    slew_rate: float = assumed(
-        6.8e5, "Pa/s", 1e4, 1e9, "DMSP-10-250 record, raw step", neutral=1e9, spread=(4e5, 1.2e6)
-    )
+    slew_rate: float = usual_slew_rate()
 
 
 @dataclass(frozen=True)
-class JointRegulator(DelayedEffects):
-    """A proportional regulator for each muscle: a first-order lag with a limited rate."""
+class JointRegulator(RegulatorEffects):
+    """A proportional regulator for each muscle: dead time, limited rate, first-order lag."""
 
     max_pressure: float = assumed(6.5e5, "Pa", 1e4, 1.2e6, "highest of the measured force map")
+    dead_time: float = usual_dead_time()
     time_constant: float = derived(
         1.0 / 23.0,
         "s",
@@ -191,14 +193,15 @@ class JointRegulator(DelayedEffects):
         "one of two poles, fluidic_muscles, Fig. 12",
         spread=(0.03, 0.06),
     )
-    slew_rate: float = assumed(1e9, "Pa/s", 1e4, 1e9, "not published; no limit", neutral=1e9)
+    slew_rate: float = usual_slew_rate()
 
 
 @dataclass(frozen=True)
-class BundleRegulator(DelayedEffects):
+class BundleRegulator(RegulatorEffects):
     """A closed-loop pressure regulator instead of the paper's valves."""
 
     max_pressure: float = published(6e5, "Pa", 1e4, 1.2e6, "largest: chakarov2018, section 2")
+    dead_time: float = usual_dead_time()
     time_constant: float = assumed(
         0.05, "s", 0.002, 2.0, "of its class; see regulator.py", spread=(0.035, 0.12)
     )
@@ -229,6 +232,26 @@ def delayed_fraction(end: float, per_width: float, switch: float) -> float:
 
 
 @kernel
+def late_shares(switch: Any, i: int, substeps: int, period: float, late: Any) -> None:
+    """Write the share of sub-step ``i`` after the ``switch`` [s] to the newer setpoint."""
+    for j in range(LANES):
+        late[j] = delayed_fraction((i + 1) * (period / substeps), substeps / period, switch[j])
+
+
+@kernel
+def stage_widths(late: Any, stage: int, h: float, width: Any) -> int:
+    """Write for how long [s] of a sub-step a setpoint holds; return the number of such lanes.
+
+    ``stage`` is 0 for the older setpoint and 1 for the newer one.
+    """
+    busy = 0
+    for j in range(LANES):
+        width[j] = h * (late[j] if stage == 1 else 1.0 - late[j])
+        busy = busy + (1 if width[j] > 0.0 else 0)
+    return busy
+
+
+@kernel
 def regulator_step(
     pressure: float, goal: float, lag: float, per_lag: float, slew: float, per_slew: float, h: float
 ) -> float:
@@ -245,6 +268,34 @@ def regulator_step(
     if gap < 0.0:
         return goal + left
     return goal - left
+
+
+@kernel
+def lag_towards(
+    fixed: Any, j: int, effects: int, lag: float, pressure: float, goal: float, full: float
+) -> float:
+    """Return the lag [s] towards a goal: exhaust is slower than filling."""
+    slower = (fixed[effects + AIR.exhaust_ratio][j] - 1.0) * (
+        1.0 - fixed[effects + AIR.exhaust_taper][j] * pressure / full
+    )
+    return lag * (1.0 + slower if goal < pressure else 1.0)
+
+
+@kernel
+def leaked(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, pressure: float, reached: float,
+    h: float,
+) -> float:  # fmt: skip
+    """Return the pressure [Pa] ``reached`` less its leak, and lower the supply by what it took."""
+    rows[state + AIR_STATE.drop][j] = supply_drop(
+        rows[state + AIR_STATE.drop][j],
+        reached - pressure,
+        fixed[effects + AIR.supply_pressure][j],
+        fixed[effects + AIR.supply_droop][j],
+        fixed[effects + AIR.supply_recovery][j],
+        h,
+    )
+    return reached * decay(fixed[effects + AIR.leak][j] * h)  # type: ignore[no-any-return]
 
 
 @kernel
@@ -266,10 +317,7 @@ def regulate_with_effects(
     opened = 1.0 if off > wide else (opened if off > band * 1.0000001 else 0.0)
     goal = goal if opened > 0.0 else pressure
     stop_low, stop_high = min(pressure, goal + band), max(pressure, goal - band)
-    slower = (fixed[effects + AIR.exhaust_ratio][j] - 1.0) * (
-        1.0 - fixed[effects + AIR.exhaust_taper][j] * pressure / full
-    )
-    lag = lag * (1.0 + slower if goal < pressure else 1.0)
+    lag = lag_towards(fixed, j, effects, lag, pressure, goal, full)
     # a spool opens by the error beyond its overlap; within the overlap it leaks
     over, within = fixed[effects + AIR.overlap][j], fixed[effects + AIR.overlap_leak][j]
     shift = over * (1.0 - within) if abs(goal - pressure) > over else 0.0
@@ -291,15 +339,26 @@ def regulate_with_effects(
     rows[state + AIR_STATE.opened][j] = opened if stopped == reached else 0.0
     reached = stopped
     reached = pressure if target < 0.0 else reached
-    rows[state + AIR_STATE.drop][j] = supply_drop(
-        drop,
-        reached - pressure,
-        rest,
-        fixed[effects + AIR.supply_droop][j],
-        fixed[effects + AIR.supply_recovery][j],
-        h,
-    )
-    return reached * decay(fixed[effects + AIR.leak][j] * h)  # type: ignore[no-any-return]
+    return leaked(rows, fixed, j, state, effects, pressure, reached, h)
+
+
+@kernel
+def regulate_with_leak(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, lag: float, slew: float, full: float,
+    target: float, h: float,
+) -> float:  # fmt: skip
+    """Return the same as :func:`regulate_with_effects` without bands, overlap, bend and choking.
+
+    Gain, slower exhaust, supply and leak are left: the effects of a normal day.
+    """
+    pressure = rows[state + AIR_STATE.regulated][j]
+    drop, rest = rows[state + AIR_STATE.drop][j], fixed[effects + AIR.supply_pressure][j]
+    goal = fixed[effects + AIR.gain][j] * target
+    lag = lag_towards(fixed, j, effects, lag, pressure, goal, full)
+    reached = regulator_step(pressure, goal, lag, 1.0 / lag, slew, 1.0 / slew, h)
+    reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
+    reached = pressure if target < 0.0 else reached
+    return leaked(rows, fixed, j, state, effects, pressure, reached, h)
 
 
 @kernel
@@ -323,16 +382,19 @@ def begin_air(rows: Any, j: int, state: int, pressure: float) -> None:
 
 @kernel
 def valve_effects_on(fixed: Any, effects: int) -> int:
-    """Return the number of lanes and effects for which the plain regulator is not sufficient."""
-    return (  # type: ignore[no-any-return]
+    """Return 0 where the plain regulator is sufficient, 1 for the effects of a day, 2 for all."""
+    rare = (
         count_on(fixed[effects + AIR.dead_band], 0.0)
         + count_on(fixed[effects + AIR.overlap], 0.0)
-        + count_on(fixed[effects + AIR.exhaust_ratio], 1.0)
         + count_on(fixed[effects + AIR.exhaust_rate], UNCHOKED)
-        + count_on(fixed[effects + AIR.leak], 0.0)
-        + count_on(fixed[effects + AIR.supply_pressure], AMPLE)
         + count_on(fixed[effects + AIR.slew_bend], 0.0)
     )
+    daily = (
+        count_on(fixed[effects + AIR.exhaust_ratio], 1.0)
+        + count_on(fixed[effects + AIR.leak], 0.0)
+        + count_on(fixed[effects + AIR.supply_pressure], AMPLE)
+    )
+    return 2 if rare > 0 else (1 if daily > 0 else 0)
 
 
 @kernel
@@ -374,13 +436,17 @@ def air_step(
     ``state`` and ``effects`` are the first rows of the air's state (``AIR_STATE``) and effects
     (``AIR``); ``full`` [Pa], ``lag`` [s] and ``slew`` [Pa/s] are rows. A target below zero shuts
     the valve. ``own`` is two rows of scratch; the second receives the pressures before. ``valve``
-    and ``lines`` are above 0 where effects of valve and supply, and of the line, are on.
+    is that of :func:`valve_effects_on`; ``lines`` is above 0 where lines ring.
     """
     regulated = rows[state + AIR_STATE.regulated]
     for j in range(LANES):
         before = regulated[j]
-        if valve > 0:
+        if valve > 1:
             after = regulate_with_effects(
+                rows, fixed, j, state, effects, lag[j], slew[j], full[j], target[j], width[j]
+            )
+        elif valve > 0:
+            after = regulate_with_leak(
                 rows, fixed, j, state, effects, lag[j], slew[j], full[j], target[j], width[j]
             )
         else:

@@ -9,8 +9,6 @@ Level walking is measured (one subject, a stride of 1.224 s); both stairs are sy
 through a few knots (``data/PROVENANCE.md``).
 """
 
-from __future__ import annotations
-
 import csv
 from functools import lru_cache
 from pathlib import Path
@@ -27,10 +25,8 @@ KNEE, SHANK, GROUND_Z, GROUND_X, COP, ANKLE = range(len(SIGNALS))
 """Knee flexion [rad], lean of the shank (knee ahead of the ankle) [rad], vertical and horizontal
 ground force over body weight, centre of pressure ahead of the ankle [m], dorsiflexion [rad]."""
 
-NATURAL_STRIDE = 1.224
-"""Duration [s] of the measured stride; ground forces are those of this pace."""
-PAPER_STRIDE = 5.0
-"""Duration [s] of the stride of yeh2010."""
+NATURAL_STRIDE = 1.224  # duration [s] of the measured stride; ground forces are those of this pace
+PAPER_STRIDE = 5.0  # duration [s] of the stride of yeh2010
 
 FOLDER = Path(__file__).resolve().parent.parent / "data"
 

@@ -2,13 +2,10 @@
 
 A path is given by the joint angles of its two ends, between which each joint moves in a straight
 line; its poses are those of the arm on this line. So every path is feasible, and a plan can be
-compared with known joint angles. The example of fluidic_muscles gives joint angles, not the ends of
-a straight line of the tool: with joint angles the smallest angles peak at 37.12 degrees and the
-weighted ones at 27.77, as stated; with a straight line of tip and direction at 39.0 and 28.2
-degrees.
+compared with known joint angles. fluidic_muscles prints neither the path of its example nor its
+angles. Between the ends chosen here the smallest angles peak at 37.12 degrees and the weighted ones
+at 27.77; along a straight line of tip and direction at 39.0 and 28.2 degrees.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -20,25 +17,20 @@ from pam_envs.kernels.random import seed_words, uniform
 
 Array = NDArray[np.float64]
 
-POINTS = 41
-"""Poses of a path (fluidic_muscles's example)."""
-STREAM = 40
-"""Random stream of drawn paths (one draw number an angle)."""
+POINTS = 41  # poses of a path (fluidic_muscles's example)
+STREAM = 40  # random stream of drawn paths (one draw number an angle)
 MOST_TRIES = 1000
 
 
 @dataclass(frozen=True)
 class PathEnds:
-    """Joint angles [degrees] at both ends of a path, one entry a joint.
-
-    ``calibrated`` ends were chosen so that the angles peak as published: these peaks are inputs,
-    and no evidence for results obtained with them.
-    """
+    """Joint angles [degrees] at both ends of a path, one entry a joint."""
 
     name: str
     start_degrees: tuple[float, ...]
     end_degrees: tuple[float, ...]
     source: str
+    # chosen so that the angles peak as published: then these peaks are inputs, no evidence
     calibrated: bool
 
     def angles(self, points: int = POINTS) -> Array:
@@ -74,10 +66,7 @@ PATHS = (
 
 
 def joint_line(start: ArrayLike, end: ArrayLike, points: int = POINTS) -> Array:
-    """Return joint angles from ``start`` to ``end`` [rad] in equal steps, shape (points, n).
-
-    Raises ValueError if the ends do not fit, or there are fewer than two points.
-    """
+    """Return angles from start to end [rad] (points, n); ValueError if the ends do not fit."""
     first, last = np.asarray(start, float), np.asarray(end, float)
     if first.ndim != 1 or first.shape != last.shape:
         raise ValueError(

@@ -6,8 +6,6 @@ in each window of equal duration, with a rest before it, at minimum jerk (T. Fla
 coordination of arm movements, J. Neuroscience 5 (1985)).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.arithmetic import TURN, sine_of_turns
@@ -23,11 +21,9 @@ ROWS = 11
 """Rows of one motion: its kind, the words of the random key, the range, seconds of a window, the
 place where it begins, and size and frequency [Hz] of two sines."""
 
-STREAM = 36
-"""Random stream of motions: the first draws are of the constants, then three a window."""
+STREAM = 36  # random stream of motions: the first draws are of the constants, then three a window
 FIRST_WINDOW = 16
-SHORTEST, LONGEST = 0.4, 0.9
-"""Shares of a window that a reach may take."""
+SHORTEST, LONGEST = 0.4, 0.9  # shares of a window that a reach may take
 
 
 @kernel

@@ -9,8 +9,6 @@ the next in a straight line (share 1: steps; share 0: ramps). So a preview is an
 later time, and only the constants are stored.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.arithmetic import sine_of_turns
@@ -18,8 +16,7 @@ from pam_envs.kernels.build import kernel, routine
 from pam_envs.kernels.random import uniform
 
 FAMILIES = ("steps", "ramps", "sines", "multisine", "staircase", "mixed")
-SAMPLES = len(FAMILIES)
-"""Family number of a reference that is given as samples."""
+SAMPLES = len(FAMILIES)  # family number of a reference that is given as samples
 
 KNOTS = 24
 SINES = 4
@@ -27,8 +24,7 @@ RATE, RAMP, KNOT, SINE = 0, 1, 2, 2 + KNOTS
 ROWS = 2 + KNOTS + 3 * SINES
 """Rows of one reference: knots a second, ramp share, knots, then (a, f, phi) of each sine."""
 
-STREAM = 32
-"""Random stream of reference draws (one draw number a constant)."""
+STREAM = 32  # random stream of reference draws (one draw number a constant)
 
 STEPS, RAMPS, SINGLE, MULTI, STAIRCASE, MIXED = 0, 1, 2, 3, 4, 5
 _RISE = KNOTS // 4

@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from pam_envs.kernels.arithmetic import decay
-from pam_envs.kernels.build import kernel, routine
-from pam_envs.kernels.history import N_HISTORY, note, noted
+from pam_envs.kernels.arithmetic import count_on, decay
+from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.kernels.history import N_HISTORY, fill_ring, note, noted
 from pam_envs.parameters import assumed, effect, parameter_rows
 
 _SEEN = "not published; of the order seen on public rigs"
@@ -151,13 +151,19 @@ SENSOR = parameter_rows(SensorEffects)
 """Rows of a sensor's effects, from its first."""
 
 
-@routine
+@kernel
+def bowed(x: float, bow: float, full: float) -> float:
+    """Return the reading of a quantity on a bowed scale, exact at 0 and at full scale."""
+    return x + bow * x * (x / full - 1.0)
+
+
+@kernel
 def drift_of(time: float, rate: float, span: float) -> float:
     """Return a drift that begins at a rate and settles within a span [s]."""
     return rate * span * (1.0 - decay(min(40.0, time / span)))
 
 
-@routine
+@kernel
 def ramp_of(time: float, middle: float, over: float) -> float:
     """Return a smooth rise from 0 to 1 about a middle [s]."""
     s = max(0.0, min(1.0, (time - middle) / over + 0.5))
@@ -165,35 +171,62 @@ def ramp_of(time: float, middle: float, over: float) -> float:
 
 
 @kernel
-def sense(
-    rows: Any, fixed: Any, j: int, reading: int, ring: int, effects: int, value: float,
-    full: float, step: int,
-    time: float, period: float,
-) -> None:  # fmt: skip
-    """Write the reading of one lane, without bias, noise and quantisation.
-
-    ``ring`` is the first of ``N_HISTORY`` rows of the measured quantity, ``effects`` the first row
-    of the sensor's effects (``SENSOR``); ``full`` is the full scale, ``time`` and ``period`` are in
-    seconds.
-    """
-    note(rows, ring, j, step, value)
+def delayed_reading(
+    rows: Any, fixed: Any, j: int, ring: int, effects: int, step: int, period: float
+) -> float:
+    """Return the quantity that the sensor of one lane measured its delay ago."""
     age = fixed[effects + SENSOR.delay][j] / period
     whole = min(int(age), N_HISTORY - 2)
     newer = noted(rows, ring, j, step, whole)
     older = noted(rows, ring, j, step, whole + 1)
-    x = newer + (age - whole) * (older - newer)
+    return newer + (age - whole) * (older - newer)
+
+
+@kernel
+def ramp_and_slip(fixed: Any, j: int, effects: int, time: float) -> tuple[float, float]:
+    """Return ramp and slip of the reading of one lane at a time [s]."""
     slipped = max(0.0, min(1.0, (time - fixed[effects + SENSOR.slip_at][j]) / SLIDE + 0.5))
-    drift = drift_of(time, fixed[effects + SENSOR.drift][j], fixed[effects + SENSOR.drift_time][j])
     ramp = fixed[effects + SENSOR.ramp][j] * ramp_of(
         time, fixed[effects + SENSOR.ramp_at][j], fixed[effects + SENSOR.ramp_over][j]
     )
-    rows[reading][j] = (
-        x
-        + fixed[effects + SENSOR.bow][j] * x * (x / full - 1.0)
-        + drift
-        + ramp
-        + fixed[effects + SENSOR.slip][j] * slipped
+    return ramp, fixed[effects + SENSOR.slip][j] * slipped
+
+
+@routine
+def sense(
+    rows: Any, fixed: Any, reading: int, ring: int, effects: int, value: Any, full: Any, step: Any,
+    period: float,
+) -> None:  # fmt: skip
+    """Write the readings of a tile, without bias, noise and quantisation.
+
+    ``ring`` is the first of ``N_HISTORY`` rows of the measured quantity, ``effects`` the first row
+    of the sensor's effects (``SENSOR``). ``value`` is the quantity, ``full`` the full scale and
+    ``step`` the number of control periods before this one, rows; ``period`` is in seconds.
+    """
+    shown = rows[reading]
+    for j in range(LANES):
+        note(rows, ring, j, step[j] + 1, value[j])
+        shown[j] = value[j]
+    if count_on(fixed[effects + SENSOR.delay], 0.0) > 0:
+        for j in range(LANES):
+            shown[j] = delayed_reading(rows, fixed, j, ring, effects, step[j] + 1, period)
+    if count_on(fixed[effects + SENSOR.bow], 0.0) > 0:
+        for j in range(LANES):
+            shown[j] = bowed(shown[j], fixed[effects + SENSOR.bow][j], full[j])
+    if count_on(fixed[effects + SENSOR.drift], 0.0) > 0:
+        for j in range(LANES):
+            shown[j] = shown[j] + drift_of(
+                (step[j] + 1) * period,
+                fixed[effects + SENSOR.drift][j],
+                fixed[effects + SENSOR.drift_time][j],
+            )
+    moves = count_on(fixed[effects + SENSOR.ramp], 0.0) + count_on(
+        fixed[effects + SENSOR.slip], 0.0
     )
+    if moves > 0:
+        for j in range(LANES):
+            ramp, slip = ramp_and_slip(fixed, j, effects, (step[j] + 1) * period)
+            shown[j] = shown[j] + ramp + slip
 
 
 @kernel
@@ -201,6 +234,6 @@ def begin_sensor(
     rows: Any, fixed: Any, j: int, reading: int, ring: int, effects: int, value: float, full: float
 ) -> None:
     """Begin the sensor of one lane at a quantity that has been constant (see :func:`sense`)."""
-    for k in range(N_HISTORY):
-        rows[ring + k][j] = value
-    sense(rows, fixed, j, reading, ring, effects, value, full, 0, 0.0, 0.01)
+    fill_ring(rows, ring, j, value)
+    ramp, slip = ramp_and_slip(fixed, j, effects, 0.0)
+    rows[reading][j] = bowed(value, fixed[effects + SENSOR.bow][j], full) + ramp + slip

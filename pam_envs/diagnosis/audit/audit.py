@@ -1,7 +1,5 @@
 """Audit of a recording or a table before its diagnosis: problems, warnings, undecidable causes."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
@@ -37,18 +35,7 @@ class Audit:
 
 
 def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Audit:
-    """Check a recording, or a table of settled readings.
-
-    Parameters
-    ----------
-    recording : Recording or ContractionTable
-    rig : Rig, optional
-
-    Returns
-    -------
-    Audit
-        Sentences with rows of the file and remedies.
-    """
+    """Return the findings on a recording, or on a table of readings, with rows and remedies."""
     if isinstance(recording, ContractionTable):
         return Audit((), tuple(audit_table(recording)))
     rig = rig or Rig()
@@ -84,20 +71,7 @@ def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Au
 def undecidable(
     recording: Recording, rig: Rig | None = None, causes: Sequence[Cause] | None = None
 ) -> dict[str, str]:
-    """Return the causes that a recording cannot decide, with the reason.
-
-    Parameters
-    ----------
-    recording : Recording
-    rig : Rig, optional
-    causes : sequence of Cause, optional
-        Default: :func:`pam_envs.diagnosis.causes.catalogue`.
-
-    Returns
-    -------
-    dict of str to str
-        Reason by name of the cause. Other causes may still not be excited.
-    """
+    """Return the causes, of the catalogue by default, that a recording cannot decide, and why."""
     unmet, reasons = _unmet_needs(recording, rig or Rig()), {}
     for cause in catalogue() if causes is None else causes:
         lacks = [unmet[word] for word in cause.needs if word in unmet]

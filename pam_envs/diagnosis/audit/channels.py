@@ -3,8 +3,6 @@
 Each check returns sentences with rows of the file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

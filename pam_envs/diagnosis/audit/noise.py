@@ -6,8 +6,6 @@ command is constant. A declared noise is compared with them. Repeats that differ
 are not used: the change between them is for the diagnosis to explain.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping
 
@@ -269,10 +267,7 @@ def _expected(covariance: Array, lags: Indices) -> Array:
 
 
 def white_noise(recording: Recording, values: Array) -> float:
-    """Return the RMS of the white part of a channel, from second differences.
-
-    Only the third of the recording with the smallest change of the command is used.
-    """
+    """Return the RMS of the white part of a channel, from its calmest third."""
     size = max(25, round(1.0 / recording.period))
     n = len(values) // size * size
     if n < 3 * size:

@@ -1,7 +1,5 @@
 """Checks of a table of settled readings: drift over repeats, copies, unequal scatter."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

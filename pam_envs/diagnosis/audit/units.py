@@ -1,7 +1,5 @@
 """Detection of wrong units, with the factor that corrects a column."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Catalogue of causes: each file below this folder declares one as ``CAUSE``."""
 
-from __future__ import annotations
-
 import runpy
 from collections.abc import Sequence
 from functools import cache
@@ -28,18 +26,7 @@ def catalogue() -> tuple[Cause, ...]:
 
 
 def causes_in(folder: str | Path) -> tuple[Cause, ...]:
-    """Return the causes declared in the files of a user's folder, sorted by name.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Each Python file in it, or in a subfolder, declares one :class:`Cause` as ``CAUSE``.
-
-    Raises
-    ------
-    ValueError
-        If there is no file, or one declares no cause.
-    """
+    """Return the causes that the Python files of a folder declare as ``CAUSE``; else ValueError."""
     made = []
     for path in _files(Path(folder)):
         cause = runpy.run_path(str(path)).get("CAUSE")

@@ -5,8 +5,6 @@ Both are run on the rig if it can be simulated, otherwise on the extended plant 
 held-out experiments added. The error is that of the true position.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -130,10 +128,7 @@ def reach(rig: Rig, full: float, period: float) -> float:
 
 
 def run(controller: Controller, rig: Rig, reference: Array, load: float, seed: int) -> Array:
-    """Return the error [m] of the true position after each control period, shape (n,).
-
-    The reference [m] has the shape (n + PREVIEW,), the load is in kg.
-    """
+    """Return the errors [m] of the true position (n,) on a reference (n + PREVIEW,) [m]."""
     rig.reset(seed)
     controller.reset()
     reading = pressure = 0.0

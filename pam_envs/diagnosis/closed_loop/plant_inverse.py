@@ -13,8 +13,6 @@ with a fixed disturbance, scaling and delay of the setpoint as model error.
 Horizons, grid, disturbances and seeds are the same for every plant.
 """
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 import numpy as np
@@ -77,10 +75,7 @@ class Simulated(Rig, Protocol):
     noise: float  # RMS noise of the contraction reading [m]
 
     def try_ahead(self, set_points: ArrayLike, periods: int) -> Array:
-        """Return future positions of copies [m], shape (periods, m).
-
-        ``set_points`` [Pa] are held, shape (m,), or one a period, shape (periods, m).
-        """
+        """Return future positions [m], shape (periods, m), under setpoints (m,), (periods, m)."""
 
     def batch(self, n: int) -> Batch:
         """Return ``n`` copies at rest, free of noise."""
@@ -95,16 +90,8 @@ class Controller(Protocol):
     def act(self, reference: Array, reading: float, pressure: float, load: float) -> float:
         """Return the setpoint [Pa] of the present period.
 
-        Parameters
-        ----------
-        reference : ndarray, shape (k,)
-            Desired contraction [m] now and in the following periods, k >= 1.
-        reading : float
-            Contraction reading [m].
-        pressure : float
-            Pressure reading [Pa].
-        load : float
-            Load [kg].
+        ``reference`` (k,) is the desired contraction [m] now and in the following periods; the
+        readings are of contraction [m] and pressure [Pa], the load is in kg.
         """
 
 
@@ -113,10 +100,7 @@ FAN = np.concatenate([-_SIDE[::-1], [0.0], _SIDE])
 
 
 def crossing(slopes: Array, errors: Array, middle: int) -> float:
-    """Return the slope at which the error vanishes, nearest to the middle of the fan.
-
-    Without a zero crossing the slope of the smallest error, the gentlest of several.
-    """
+    """Return the slope of least error: the zero crossing nearest to the middle, if any."""
     below = errors < 0.0
     turns = np.flatnonzero(below[1:] != below[:-1])
     if len(turns) == 0:

@@ -1,7 +1,5 @@
 """Comparison of fitted models: penalised gains, preference for simpler causes, significance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Held-out data for the reported errors and gains, and the models fitted without them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

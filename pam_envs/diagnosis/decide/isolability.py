@@ -1,7 +1,5 @@
 """Isolability and testability of causes, simulated before any residual is used."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

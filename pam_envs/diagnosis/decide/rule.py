@@ -3,8 +3,6 @@
 The thresholds were set on drawn cases that no benchmark reports.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

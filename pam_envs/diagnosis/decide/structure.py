@@ -146,10 +146,7 @@ def _explained(residual: Array, prediction: Array) -> float:
 
 
 def flexible_r2(residual: Array, regressors: Regressors, blocks: Blocks) -> float:
-    """Return the share of a residual that ridge regression explains on held-out blocks.
-
-    The residual is NaN where there is no reading.
-    """
+    """Return the share of a residual that ridge regression explains on held-out blocks."""
     parts = _parts(np.isfinite(residual), blocks)
     if parts is None:
         return 0.0

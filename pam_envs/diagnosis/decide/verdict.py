@@ -1,7 +1,5 @@
 """Decision of a diagnosis: models with more and more causes, the evidence, the verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,16 +8,8 @@ import numpy as np
 
 from pam_envs.diagnosis.arrays import Array, Indices
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.decide.compare import (
-    cross_validate,
-    distinct,
-    imitates,
-    p_value,
-    penalised_gain,
-    possible_gain,
-    prefer_simpler,
-    share_ahead,
-)
+from pam_envs.diagnosis.decide import compare
+from pam_envs.diagnosis.decide.compare import cross_validate
 from pam_envs.diagnosis.decide.rule import Judgement, Rule, judge, required_gain
 from pam_envs.diagnosis.decide.search import search
 from pam_envs.diagnosis.decide.structure import Regressors, flexible_r2, spectral_peak
@@ -50,7 +40,6 @@ class Decision:
     model: Candidate  # the base with the named causes
     rivals: list[Candidate] = field(default_factory=list)  # best first
     open_rivals: list[Candidate] = field(default_factory=list)  # those that are not excluded
-    structure: dict[str, Any] = field(default_factory=dict)  # remaining structure before and after
     evidence: dict[str, Any] = field(default_factory=dict)  # see Ladder.evidence
 
 
@@ -91,7 +80,9 @@ class Ladder:
 
     def gain(self, model: Candidate, base: Candidate | None = None) -> float:
         """Return the penalised gain of a model over another one (default: the base)."""
-        return penalised_gain(self.blocks, self.base if base is None else base, model, self.rule)
+        return compare.penalised_gain(
+            self.blocks, self.base if base is None else base, model, self.rule
+        )
 
     def level(self, model: Candidate, rivals: list[Candidate]) -> Level:
         """Return a level with the remaining structure of its model."""
@@ -103,7 +94,7 @@ class Ladder:
         rivals = search(self.problem, self.family, self.blocks, self.base, self.causes)
         if not rivals:
             return []
-        rivals = prefer_simpler(self.blocks, self.base, rivals, self.rule)
+        rivals = compare.prefer_simpler(self.blocks, self.base, rivals, self.rule)
         found, repaired = [(rivals[0], rivals)], False
         while len(found) < self.rule.most:
             larger = self.larger(found)
@@ -121,7 +112,7 @@ class Ladder:
         """Return models with one more cause than the last, best first; none if none is needed."""
         model, rivals = found[-1]
         first_gain = self.gain(found[0][0])
-        possible = possible_gain(self.blocks, model)
+        possible = compare.possible_gain(self.blocks, model)
         required = required_gain(first_gain, possible, self.rule)
         if first_gain < self.rule.least_gain or possible < required:
             return []
@@ -133,7 +124,7 @@ class Ladder:
             for first in rivals[1 : self.rule.beam]:
                 larger += search(*data, first, self.causes, 2)[:4]
         larger.sort(key=lambda c: -self.gain(c))
-        return prefer_simpler(self.blocks, self.base, distinct(larger), self.rule)
+        return compare.prefer_simpler(self.blocks, self.base, compare.distinct(larger), self.rule)
 
     def without_one_cause(self, model: Candidate, known: Models) -> Models | None:
         """Return smaller models if one started from a larger model beats the known one.
@@ -145,7 +136,7 @@ class Ladder:
         if self.gain(best) < self.gain(known[0]) + self.rule.simpler:
             return None
         rivals = [best, *(r for r in known[1] if set(r.names) != set(best.names))]
-        rivals = prefer_simpler(self.blocks, self.base, rivals, self.rule)
+        rivals = compare.prefer_simpler(self.blocks, self.base, rivals, self.rule)
         return rivals[0], rivals
 
     def evidence(self, levels: Sequence[Level]) -> dict[str, Any]:
@@ -166,8 +157,8 @@ class Ladder:
                 {
                     "gain": self.gain(level.model),
                     "added": self.gain(level.model, before),
-                    "possible": possible_gain(self.blocks, before),
-                    "unsure": p_value(
+                    "possible": compare.possible_gain(self.blocks, before),
+                    "unsure": compare.p_value(
                         self.problem, self.blocks, before, level.model, len(level.rivals)
                     ),
                     "left": level.left,
@@ -191,27 +182,24 @@ class Ladder:
         return {
             "names": list(rival.names),
             "forms": [form.name for _, form in rival.causes],
-            "gain": penalised_gain(blocks, base, rival, self.rule),
-            "better": share_ahead(blocks, rival, best, draws),
-            "imitates": imitates(rival, best),
+            "gain": compare.penalised_gain(blocks, base, rival, self.rule),
+            "better": compare.share_ahead(blocks, rival, best, draws),
+            "imitates": compare.imitates(rival, best),
             "out": False,
         }
 
     def cross_validate(
         self, levels: list[Level], judged: Judgement, evidence: dict[str, Any]
     ) -> None:
-        """Compare open rivals on all blocks; update the level and its evidence in place.
-
-        Rivals that are already excluded stay excluded: their gains are of fewer blocks.
-        """
+        """Compare open rivals on all blocks; update the level and its evidence in place."""
         level, found = levels[judged.level], evidence["levels"][judged.level]
         places = [0, *judged.open_rivals]
         smaller = levels[judged.level - 1].model
         compared = [levels[0].model, smaller, *(level.rivals[k] for k in places)]
         base, before, *again = cross_validate(self.problem, self.blocks, compared, self.rule)
         every = replace(self.blocks, held_out=np.ones_like(self.blocks.held_out))
-        ranked = sorted(again, key=lambda c: -penalised_gain(every, base, c, self.rule))
-        order = prefer_simpler(every, base, ranked, self.rule)
+        ranked = sorted(again, key=lambda c: -compare.penalised_gain(every, base, c, self.rule))
+        order = compare.prefer_simpler(every, base, ranked, self.rule)
         draws = every.draws(self.rule.draws, self.seed)
         rows = [self.row(every, base, c, order[0], draws) for c in order]
         places = [places[next(i for i, c in enumerate(again) if c is o)] for o in order]
@@ -222,8 +210,8 @@ class Ladder:
             "rivals": rows + excluded,
             "crossed": len(rows),
             "gain": rows[0]["gain"],
-            "added": penalised_gain(every, before, order[0], self.rule),
-            "unsure": p_value(self.problem, self.blocks, smaller, best, len(level.rivals)),
+            "added": compare.penalised_gain(every, before, order[0], self.rule),
+            "unsure": compare.p_value(self.problem, self.blocks, smaller, best, len(level.rivals)),
         }
         if best is not level.model:
             found["left"] = self.level(best, []).left
@@ -251,14 +239,8 @@ def decide(
         judged = judge(evidence, rule)
     selected = levels[judged.level]
     rivals = selected.rivals if judged.level else levels[min(1, len(levels) - 1)].rivals
-    return Decision(
-        judged.verdict,
-        selected.model,
-        rivals,
-        [rivals[k] for k in judged.open_rivals],
-        {"before": levels[0].left, "after": selected.left},
-        evidence,
-    )
+    still = [rivals[k] for k in judged.open_rivals]
+    return Decision(judged.verdict, selected.model, rivals, still, evidence)
 
 
 def effect_traces(problem: Problem, family: PlantFamily, model: Candidate) -> dict[str, Array]:

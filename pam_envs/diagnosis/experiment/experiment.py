@@ -4,8 +4,6 @@ The separation of two rivals in an experiment is the difference of their predict
 refit of either one's own parameters to the new data cannot remove.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -116,10 +114,7 @@ def propose(
     causes: Sequence[Cause],
     longest_step: float = LONGEST_STEP,
 ) -> dict[str, Any]:
-    """Return the experiment that best separates a model from all its rivals, for the report.
-
-    The experiment with the largest separation from the nearest rival.
-    """
+    """Return the experiment with the largest separation of a model from its nearest rival."""
     rivals = (first, *seconds)
     scored = [
         (separations(plant, rivals, inputs_of(p, longest_step), noise), p) for p in plans(means)

@@ -1,17 +1,13 @@
 """Figures of a diagnosis, as SVG elements for its page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
 from pam_envs.diagnosis.figures.canvas import Picture, drawing
-from pam_envs.diagnosis.figures.loops import loops, scatter
-from pam_envs.diagnosis.figures.matrix import isolability
-from pam_envs.diagnosis.figures.over_time import effects, replay, residual, zoom
+from pam_envs.diagnosis.figures.of_readings import Curves, cell_effects, cycles, left_over
+from pam_envs.diagnosis.figures.of_report import isolability, kinds, rivals, structure
+from pam_envs.diagnosis.figures.of_traces import effects, loops, replay, residual, scatter, zoom
 from pam_envs.diagnosis.figures.quantities import View
-from pam_envs.diagnosis.figures.ranked import kinds, rivals, structure
-from pam_envs.diagnosis.figures.readings import Curves, cell_effects, cycles, left_over
 
 __all__ = ["Picture", "draw"]
 
@@ -21,10 +17,7 @@ OF_REPORT = (structure, rivals, kinds, isolability)
 
 
 def draw(report: Mapping[str, Any], traces: Any) -> dict[str, Picture]:
-    """Draw the figures of a diagnosis, by name; ModuleNotFoundError without matplotlib.
-
-    Without ``traces`` only figures of the report itself, and of its settled readings.
-    """
+    """Draw the figures of a diagnosis, by name; ModuleNotFoundError without matplotlib."""
     view = None if traces is None else View.of(traces)
     with drawing():
         made = [f(report) for f in OF_REPORT]

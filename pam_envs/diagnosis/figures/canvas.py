@@ -4,8 +4,6 @@ The page is 900 pixels wide. The SVG takes fonts and colours from the page, in i
 theme.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import warnings
@@ -13,17 +11,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pam_envs.diagnosis.arrays import Array
 
-WIDTH, LEFT, RIGHT = 900.0, 62.0, 18.0
-"""Width of a figure, and its margins for ticks and labels."""
+WIDTH, LEFT, RIGHT = 900.0, 62.0, 18.0  # width of a figure, and its margins for ticks and labels
 INSIDE = WIDTH - LEFT - RIGHT
-LEGEND = 36.0
-"""Height of the legend at the top."""
+LEGEND = 36.0  # height of the legend at the top
 
 INK, MUTED, RULE, PAPER = "#1a1c20", "#646b75", "#dfe2e7", "#fefefe"
 MEASURED, BASE, EXTENDED, FLOOR = "#9aa1ab", "#d55e00", "#0072b2", "#009e73"
@@ -33,35 +30,10 @@ _COLOURS = (INK, MUTED, RULE, PAPER, MEASURED, BASE, EXTENDED, FLOOR, HELD, RISI
 VARIABLES = dict(zip(_COLOURS, _NAMES.split(), strict=True))
 """Colours for colour-blind readers (after Okabe and Ito), with their names on the page."""
 
-STYLE = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "pam-envs",
-    "text.parse_math": False,
-    "path.simplify": False,
-    "font.family": "DejaVu Sans",
-    "font.size": 12.0,
-    "axes.labelsize": 12.0,
-    "axes.edgecolor": MUTED,
-    "axes.labelcolor": MUTED,
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.facecolor": "none",
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.unicode_minus": True,
-    "grid.color": RULE,
-    "grid.linewidth": 0.8,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-    "xtick.labelsize": 11.0,
-    "ytick.labelsize": 11.0,
-    "xtick.major.size": 3.0,
-    "ytick.major.size": 0.0,
-    "xtick.major.width": 0.8,
-    "text.color": INK,
-    "legend.frameon": False,
-    "legend.fontsize": 12.0,
+STYLE = Path(__file__).with_name("page.mplstyle")
+COLOURS = {
+    **dict.fromkeys(("axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color"), MUTED),
+    **{"grid.color": RULE, "text.color": INK},
 }
 DASHES = (0, (5, 3))
 Entry = tuple[str, str, dict[str, Any]]
@@ -83,7 +55,7 @@ def drawing() -> Iterator[None]:
     """Configure matplotlib while drawing; ModuleNotFoundError without it."""
     import matplotlib
 
-    with matplotlib.rc_context(STYLE), warnings.catch_warnings():
+    with matplotlib.rc_context(COLOURS, STYLE), warnings.catch_warnings():
         # the page's own fonts have the glyphs that the measuring font lacks
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
@@ -179,10 +151,7 @@ def legend_of(both: bool, alone: str, before: str, after: str, kind: str = "line
 
 
 def dots(ax: Any, x: Array, y: Array, colour: str) -> None:
-    """Draw points as one path of strokes without length: a fifth of the file size of markers.
-
-    The limits of the axes are unchanged.
-    """
+    """Draw points as one path of strokes without length: a fifth of the bytes of markers."""
     import matplotlib.patches
     import matplotlib.path
 
@@ -231,11 +200,7 @@ def _path(text: str) -> str:
 
 
 def _style(text: str) -> str:
-    text = re.sub(r"font: (?:(\w+) )?([\d.]+)px [^;\"]*", _font, text)
+    text = re.sub(r"font: (\w+) ([\d.]+px)", r"font-weight: \1; font: \2", text)
+    text = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font-size: \1", text)
     names = {colour: f"var(--{name})" for colour, name in VARIABLES.items()}
     return re.sub(r"#[0-9a-f]{6}", lambda found: names.get(found[0], found[0]), text)
-
-
-def _font(found: re.Match[str]) -> str:
-    weight = f"font-weight: {found[1]}; " if found[1] else ""
-    return f"{weight}font-size: {found[2]}px"

@@ -33,18 +33,14 @@ class Span:
 
 @dataclass(frozen=True)
 class View:
-    """Time series in display units (mm, bar, N, deg C), all of shape (T,), by channel.
+    """Time series in display units (mm, bar, N, deg C), all of shape (T,), by channel."""
 
-    ``clock`` is the time since the start without pauses between parts of a recording [s];
-    ``effects`` are the contributions of causes; ``extended`` is empty without an extension.
-    """
-
-    clock: Array
+    clock: Array  # time since the start without pauses between parts of a recording [s]
     spans: tuple[Span, ...]
     measured: dict[str, Array]
     base: dict[str, Array]
-    extended: dict[str, Array]
-    effects: dict[str, dict[str, Array]]
+    extended: dict[str, Array]  # empty without an extension
+    effects: dict[str, dict[str, Array]]  # contributions of causes
     command: Array | None
     load: Array | None
     temperature: Array | None

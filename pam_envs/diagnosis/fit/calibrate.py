@@ -1,7 +1,5 @@
 """Calibration of the plant's base parameters, so that wrong values are not taken for effects."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -72,12 +70,6 @@ def _regulator(problem: Problem, family: MuscleFamily) -> Fit:
     return fit
 
 
-def play_gaps(pressure: Array, thresholds: tuple[float, ...]) -> Array:
-    """Return pressure minus the output of each play operator, shape (plays, T), initially at 0."""
-    outputs = [PlayOperator((size,), (1.0,), 0.0).simulate(pressure)[0] for size in thresholds]
-    return pressure - np.reshape(outputs, (len(thresholds), len(pressure)))
-
-
 def balance(family: MuscleFamily, contraction: Array, pressure: Array) -> dict[str, float]:
     """Return coefficients of the static law and play weights; none with too few slow samples.
 
@@ -98,7 +90,8 @@ def balance(family: MuscleFamily, contraction: Array, pressure: Array) -> dict[s
     rows = rows[:: max(1, len(rows) // MOST)]
     e, p = smooth[rows] / plant.muscle.rest_length, pressure[rows]
     thresholds: tuple[float, ...] = plant.hysteresis.model.thresholds  # type: ignore[attr-defined]
-    gaps = play_gaps(pressure, thresholds)[:, rows]
+    plays = [PlayOperator((size,), (1.0,), 0.0).simulate(pressure)[0] for size in thresholds]
+    gaps = (pressure - np.reshape(plays, (len(thresholds), len(pressure))))[:, rows]
     force = load[rows] * GRAVITY
     bend = -np.expm1(-e / plant.muscle.braid_strain)
     passive = [-bend, -e, -(e**2), -(e**3), -(e**4)]

@@ -1,7 +1,5 @@
 """Models that extend the base by causes: starting points, refits and ablations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,19 +8,8 @@ import numpy as np
 
 from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.cause import Cause, Form
+from pam_envs.diagnosis.fit import least_squares as lsq
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.least_squares import (
-    FEW_DAMPINGS,
-    Fit,
-    Free,
-    PlantFamily,
-    Problem,
-    Shared,
-    differentiate,
-    evaluate,
-    improve,
-    share,
-)
 
 POLISH = 6  # largest number of rounds with the full Jacobian
 FEW_ROUNDS = 3  # rounds of a model without one of its causes
@@ -34,7 +21,7 @@ class Candidate:
     """A fitted model: the base and some causes, each in one form."""
 
     causes: tuple[tuple[Cause, Form], ...]
-    fit: Fit
+    fit: lsq.Fit
     errors: Array
 
     @property
@@ -43,7 +30,7 @@ class Candidate:
         return tuple(c.name for c, _ in self.causes)
 
 
-def frees_for(family: PlantFamily, form: Form, values: Sequence[float]) -> tuple[Free, ...]:
+def frees_for(family: lsq.PlantFamily, form: Form, values: Sequence[float]) -> tuple[lsq.Free, ...]:
     """Return the free parameters of a form with their starting values."""
     made = []
     for term, value in zip(form.terms, values, strict=True):
@@ -54,7 +41,7 @@ def frees_for(family: PlantFamily, form: Form, values: Sequence[float]) -> tuple
 
 
 def starting_points(
-    problem: Problem, family: PlantFamily, base: Fit, form: Form
+    problem: lsq.Problem, family: lsq.PlantFamily, base: lsq.Fit, form: Form
 ) -> list[tuple[float, ...]]:
     """Return the starting values of a form's fits; a search for them is done once for a base."""
     if form.search is not None:
@@ -67,13 +54,13 @@ def starting_points(
 
 
 def initial_fits(
-    problem: Problem,
-    family: PlantFamily,
-    base: Fit,
+    problem: lsq.Problem,
+    family: lsq.PlantFamily,
+    base: lsq.Fit,
     cause: Cause,
     form: Form,
-    shared: Shared | None = None,
-) -> list[Fit]:
+    shared: lsq.Shared | None = None,
+) -> list[lsq.Fit]:
     """Return the fits of a form at their starting points, with the base's Jacobian."""
     names = {f.name for f in base.frees}
     if any(t.name in names for t in form.terms):
@@ -82,60 +69,66 @@ def initial_fits(
     for values in starting_points(problem, family, base, form):
         frees = frees_for(family, form, values)
         z = np.concatenate([base.z, [f.inner(f.start) for f in frees]])
-        fits.append(Fit((*base.frees, *frees), z, base.column, shared=shared, label=(cause, form)))
+        fits.append(
+            lsq.Fit((*base.frees, *frees), z, base.column, shared=shared, label=(cause, form))
+        )
     return fits
 
 
-def polish(problem: Problem, fits: Sequence[Fit], rounds: int = POLISH) -> None:
+def polish(problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH) -> None:
     """Improve fits with the Jacobian of all their parameters."""
     for fit in fits:
         fit.done, fit.damping, fit.shared = False, 1.0, None
-    improve(problem, fits, rounds, POLISHED_ENOUGH)
+    lsq.improve(problem, fits, rounds, POLISHED_ENOUGH)
 
 
-def complete_jacobian(problem: Problem, fit: Fit) -> None:
+def complete_jacobian(problem: lsq.Problem, fit: lsq.Fit) -> None:
     """Compute the Jacobian of a fit by all its parameters, if it is missing."""
     if fit.shared is not None or len(fit.slopes) != len(fit.frees):
         fit.shared = None
-        differentiate(problem, [fit])
+        lsq.differentiate(problem, [fit])
 
 
 def fit_base(
-    problem: Problem, blocks: Blocks, column: Array, frees: tuple[Free, ...], rounds: int = 25
+    problem: lsq.Problem,
+    blocks: Blocks,
+    column: Array,
+    frees: tuple[lsq.Free, ...],
+    rounds: int = 25,
 ) -> Candidate:
     """Fit the base parameters of a plant."""
-    fit = Fit.at_start(frees, column)
-    evaluate(problem, [fit])
-    improve(problem, [fit], rounds, 1e-5)
-    differentiate(problem, [fit])
+    fit = lsq.Fit.at_start(frees, column)
+    lsq.evaluate(problem, [fit])
+    lsq.improve(problem, [fit], rounds, 1e-5)
+    lsq.differentiate(problem, [fit])
     return Candidate((), fit, blocks.errors(problem.rows(fit.residual)))
 
 
-def refit(problem: Problem, blocks: Blocks, candidate: Candidate, rounds: int = 6) -> Candidate:
+def refit(problem: lsq.Problem, blocks: Blocks, candidate: Candidate, rounds: int = 6) -> Candidate:
     """Return a candidate refitted to other training samples."""
     fit = restarted(candidate.fit, shared=None)
-    evaluate(problem, [fit])
-    improve(problem, [fit], rounds, 1e-5)
+    lsq.evaluate(problem, [fit])
+    lsq.improve(problem, [fit], rounds, 1e-5)
     return Candidate(candidate.causes, fit, blocks.errors(problem.rows(fit.residual)))
 
 
-def best_by_name(fits: Iterable[tuple[str, Fit]]) -> dict[str, Fit]:
+def best_by_name(fits: Iterable[tuple[str, lsq.Fit]]) -> dict[str, lsq.Fit]:
     """Return the fit of the least cost for each name."""
-    best: dict[str, Fit] = {}
+    best: dict[str, lsq.Fit] = {}
     for name, fit in fits:
         if name not in best or fit.cost < best[name].cost:
             best[name] = fit
     return best
 
 
-def restarted(fit: Fit, **changes: Any) -> Fit:
+def restarted(fit: lsq.Fit, **changes: Any) -> lsq.Fit:
     """Return a copy of a fit in its initial state."""
     empty = np.zeros((0, 0))
     return replace(fit, done=False, damping=1.0, begins={}, slopes=empty, **changes)
 
 
 def without_each_cause(
-    problem: Problem, blocks: Blocks, base: Candidate, model: Candidate
+    problem: lsq.Problem, blocks: Blocks, base: Candidate, model: Candidate
 ) -> dict[str, Candidate]:
     """Return the model refitted without each of its causes, from the better of two starts."""
     fits, labels = [], []
@@ -148,11 +141,11 @@ def without_each_cause(
             fits.append(restarted(model.fit, frees=frees, z=start.copy(), shared=None))
             labels.append(removed.name)
     complete_jacobian(problem, base.fit)
-    shared = share(problem, base.fit)
+    shared = lsq.share(problem, base.fit)
     for fit in fits:
         fit.shared = shared
-    evaluate(problem, fits)
-    improve(problem, fits, FEW_ROUNDS, 1e-4, FEW_DAMPINGS)
+    lsq.evaluate(problem, fits)
+    lsq.improve(problem, fits, FEW_ROUNDS, 1e-4, lsq.FEW_DAMPINGS)
     best = best_by_name(zip(labels, fits, strict=True))
     polish(problem, list(best.values()))
     return {

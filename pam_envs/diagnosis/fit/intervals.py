@@ -1,7 +1,5 @@
 """Confidence intervals of fitted parameters, robust against noise that is correlated in blocks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -60,10 +60,7 @@ class Free:
 
 
 class PlantFamily(Protocol):
-    """Interface of a plant with fixed inputs that can be diagnosed.
-
-    A plant whose parameters depend on one another also gives :attr:`Problem.tie`.
-    """
+    """A plant with fixed inputs that can be diagnosed; see also :attr:`Problem.tie`."""
 
     @property
     def column(self) -> Array:

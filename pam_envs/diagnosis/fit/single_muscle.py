@@ -170,10 +170,7 @@ GIVEN = {
 
 
 def known_of(rig: Any, values: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
-    """Return provenance and source of the assumed parameters of the default plant.
-
-    They are not published values of the rig, even where they are of the shipped muscle.
-    """
+    """Return provenance and source of the assumed parameters of the default plant."""
     made = {name: ("assumed", TAKEN) for name in values if name != "hysteresis.operator"}
     for name, attribute in GIVEN.items():
         given = getattr(rig, attribute) is not None

@@ -4,8 +4,6 @@ A step or a drift starts where it explains most of the base's residual; an effec
 that opens, a guide that breaks away) starts at the best points of a grid.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import product
 from typing import Any
@@ -61,10 +59,7 @@ step_starts.trials = 100  # type: ignore[attr-defined]
 
 
 def ramps(output: int) -> Callable[..., Starts]:
-    """Return a search for slow drifts of an output about the best step.
-
-    Its result are sizes [m], [Pa], middles [s] and durations [s].
-    """
+    """Return a search for drifts about the best step: size [m], [Pa], middle, duration [s]."""
 
     def starts(problem: Problem, family: PlantFamily, base: Fit, form: Any) -> Starts:
         found = step_starts(problem, family, base, form, output)[:1]
@@ -75,15 +70,7 @@ def ramps(output: int) -> Callable[..., Starts]:
 
 
 def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:
-    """Return a search for starting values on a grid, evaluated in one replay.
-
-    Parameters
-    ----------
-    *values : sequence of float
-        Grid of each term of the form [SI].
-    best : int
-        Number of returned points.
-    """
+    """Return a search for the ``best`` points of a grid of the terms [SI], in one replay."""
 
     def starts(problem: Problem, family: PlantFamily, base: Fit, form: Any) -> Starts:
         points = list(product(*values))

@@ -4,8 +4,6 @@ A load declared to 2 % may be off by 2 %: a fitted error within the tolerance is
 one that is significantly larger is an error of the payload.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np
@@ -41,10 +39,7 @@ def load_error_limit(loads: ArrayLike, tolerance: float) -> float:
 
 
 def may_be_within(interval: tuple[float, float], loads: ArrayLike, tolerance: float) -> bool:
-    """Return whether an error of the load, by its interval [kg], may be within its tolerance.
-
-    False if the whole interval is outside the tolerance of one of the loads [kg] above zero.
-    """
+    """Return whether an error of the load, by its interval [kg], may be within tolerance."""
     limit, (low, high) = load_error_limit(loads, tolerance), sorted(interval)
     return bool(low <= limit and high >= -limit)
 

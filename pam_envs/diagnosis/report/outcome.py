@@ -1,7 +1,5 @@
 """Outcome of a diagnosis, its time series, and the progress bar."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -35,55 +33,33 @@ def steps(progress: bool) -> Iterator[Callable[[str], None]]:
 
 @dataclass(frozen=True)
 class Traces:
-    """Time series of a report in SI, shape (T,): [s], [Pa], [N], [deg C].
-
-    ``segment`` is an index into the labels ``segments``; ``held_out`` are the samples of the
-    reported errors. ``measured``, ``base`` and ``extended`` are readings and simulations by output,
-    ``effects`` the contributions of the named causes.
-    """
+    """Time series of a report in SI, shape (T,): [s], [Pa], [N], [deg C]."""
 
     time: Array
-    segment: NDArray[np.int64]
+    segment: NDArray[np.int64]  # index into the labels ``segments``
     segments: tuple[str, ...]
-    held_out: NDArray[np.bool_]
+    held_out: NDArray[np.bool_]  # samples of the reported errors
     command: Array
     load: Array
     temperature: Array | None
-    measured: dict[str, Array]
+    measured: dict[str, Array]  # readings by output, as the simulations base and extended
     base: dict[str, Array]
     extended: dict[str, Array]
-    effects: dict[str, dict[str, Array]]
+    effects: dict[str, dict[str, Array]]  # contributions of the named causes
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Outcome of a diagnosis.
+    """Outcome of a diagnosis."""
 
-    Attributes
-    ----------
-    verdict : {"adequate", "named", "ambiguous", "unexplained", "insufficient"}
-        Verdict in one word.
-    text : str
-        Verdict in a few sentences.
-    causes : tuple of str
-        Names of the causes, in the order of evidence.
-    report : dict
-        Content of ``report.json`` (``docs/diagnosis_report.md``), in plain types, rounded.
-    base, plant : SingleMuscle
-        The refitted plant, and the plant extended by the causes; equal without a cause.
-    traces : Traces
-        Time series of the figures.
-    study : Study
-        Private: the underlying fits. It may change in any version.
-    """
-
-    verdict: str
-    text: str
-    causes: tuple[str, ...]
-    report: dict[str, Any]
-    base: SingleMuscle
-    plant: SingleMuscle
-    traces: Traces
+    verdict: str  # "adequate", "named", "ambiguous", "unexplained" or "insufficient"
+    text: str  # verdict in a few sentences
+    causes: tuple[str, ...]  # names, in the order of evidence
+    report: dict[str, Any]  # content of report.json (docs/diagnosis_report.md), rounded
+    base: SingleMuscle  # the refitted plant
+    plant: SingleMuscle  # the base extended by the causes; equal to it without a cause
+    traces: Traces  # time series of the figures
+    # private: the underlying fits (Study), which may change in any version
     study: Any = field(default=None, repr=False, compare=False)
 
     def write(self, folder: str | Path) -> None:

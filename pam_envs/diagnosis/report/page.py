@@ -1,7 +1,5 @@
 """Page of a diagnosis: one self-contained HTML file, figures first, no script."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from html import escape
 from pathlib import Path
@@ -9,19 +7,7 @@ from typing import Any
 
 from pam_envs.diagnosis.figures import Picture, draw
 from pam_envs.diagnosis.figures.quantities import TIMES, changed
-from pam_envs.diagnosis.report.page_parts import (
-    DASH,
-    DETAILS,
-    at,
-    enumeration,
-    held_out,
-    number,
-    provenance,
-    spread,
-    structure_table,
-    why,
-    words,
-)
+from pam_envs.diagnosis.report import page_parts as pp
 
 CSS = Path(__file__).with_name("page.css")
 VERDICTS = {
@@ -42,10 +28,7 @@ Report = Mapping[str, Any]
 
 
 def page(report: Report, traces: Any) -> str:
-    """Return ``report.html`` of a report as in ``report.json``, and its traces if any.
-
-    Raises ModuleNotFoundError without matplotlib.
-    """
+    """Return ``report.html`` of a report and its traces; ModuleNotFoundError without matplotlib."""
     pictures = draw(report, traces)
     parts = list(enumerate(_sections(report, pictures), start=1))
     sections = [
@@ -55,7 +38,7 @@ def page(report: Report, traces: Any) -> str:
     links = "".join(
         f'<a href="#{name}">{i}&ensp;{escape(title)}</a>' for i, (name, title, _) in parts
     )
-    package = words(at(report, "provenance", "package") or "pam-envs")
+    package = pp.words(pp.at(report, "provenance", "package") or "pam-envs")
     title = escape(f"Diagnosis: {headline(report)}")
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -73,7 +56,7 @@ def headline(report: Report) -> str:
     verdict = str(report["verdict"])
     text = VERDICTS.get(verdict, verdict)
     if verdict == "named" and titles:
-        text = enumeration(list(titles.values()))
+        text = pp.enumeration(list(titles.values()))
     elif verdict == "ambiguous" and titles:
         for rival in report.get("rivals") or []:
             if rival.get("why") == "not excluded":
@@ -90,7 +73,7 @@ def _title(cause: Report) -> str:
 
 def _head(report: Report) -> str:
     verdict = str(report["verdict"])
-    source = at(report, "provenance", "recording")
+    source = pp.at(report, "provenance", "recording")
     text = str(report.get("text") or "")
     kind = "lead" if len(text) < 320 else "lead long"
     next_step = ""
@@ -117,27 +100,27 @@ def _numbers(report: Report) -> str:
     cells = [f'<div class="head">{head}</div>' for head in (*heads, "noise floor")]
     for channel in ("contraction", "pressure"):
         keys = ("error_before", "error_after", "noise_floor")
-        before, after, floor = (at(report, key, channel) for key in keys)
+        before, after, floor = (pp.at(report, key, channel) for key in keys)
         if not before and not floor:
             continue
         cells.append(f'<div class="what">{channel}</div>')
         for kind, error in (("before", before), ("after", after))[: 1 + both]:
-            times = at(error, "times_floor")
-            note = "" if times is None else f"{number(times)} {TIMES} the noise floor"
+            times = pp.at(error, "times_floor")
+            note = "" if times is None else f"{pp.number(times)} {TIMES} the noise floor"
             cells.append(_big(kind, error, note))
         cells.append(_big("noise", floor, f"from {floor['from']}" if floor else ""))
     if len(cells) <= len(heads) + 1:
         return ""
-    note = f'<p class="over">Root mean square {escape(held_out(report))}.</p>'
+    note = f'<p class="over">Root mean square {escape(pp.held_out(report))}.</p>'
     return f'<div class="numbers{"" if both else " two"}">{"".join(cells)}</div>\n{note}'
 
 
 def _big(kind: str, value: Report | None, note: str) -> str:
     if not value or value.get("value") is None:
-        return f'<div class="{kind}"><b>{DASH}</b></div>'
+        return f'<div class="{kind}"><b>{pp.DASH}</b></div>'
     unit = escape(str(value.get("unit") or ""))
-    small = "".join(f"<small>{escape(s)}</small>" for s in (note, spread(value)) if s)
-    return f'<div class="{kind}"><b>{number(value["value"])} <i>{unit}</i></b>{small}</div>'
+    small = "".join(f"<small>{escape(s)}</small>" for s in (note, pp.spread(value)) if s)
+    return f'<div class="{kind}"><b>{pp.number(value["value"])} <i>{unit}</i></b>{small}</div>'
 
 
 def _sections(report: Report, pictures: Mapping[str, Picture]) -> Iterable[tuple[str, str, str]]:
@@ -150,15 +133,15 @@ def _sections(report: Report, pictures: Mapping[str, Picture]) -> Iterable[tuple
         return "\n".join(found) or f'<p class="none">{NOTHING[names[0]]}</p>'
 
     yield "replay", "Replay", shown("replay", "zoom")
-    left = shown("residual", "structure", "scatter") + structure_table(report)
+    left = shown("residual", "structure", "scatter") + pp.structure_table(report)
     yield "residual", "Residual", left
     loops = shown("loops")
     if report.get("readings"):
         loops = '<p class="none">For settled readings see the replay.</p>'
     yield "loops", "Hysteresis loops", loops
-    yield "rivals", "Rival causes", shown("rivals") + why(report)
+    yield "rivals", "Rival causes", shown("rivals") + pp.why(report)
     yield "kinds", "Held out", shown("kinds")
     yield "effects", "Effect of each cause", shown("effects")
     yield "isolability", "Isolability of causes in this recording", shown("isolability")
-    yield "details", "Details", "\n".join(part(report) for part in DETAILS)
-    yield "provenance", "Provenance", provenance(report)
+    yield "details", "Details", "\n".join(part(report) for part in pp.DETAILS)
+    yield "provenance", "Provenance", pp.provenance(report)

@@ -1,7 +1,5 @@
 """Tables and numbers of the page as HTML, with all text escaped."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any

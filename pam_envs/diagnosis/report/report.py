@@ -1,11 +1,9 @@
 """Files of a diagnosis: ``report.json``, ``report.html`` and ``plant.yaml``.
 
 Every key of ``report.json`` is described in ``docs/diagnosis_report.md``. The same report gives the
-same bytes: keys in a fixed order, numbers with six significant digits, ``null`` for values that are
-not finite. Files are replaced atomically.
+same bytes: numbers have six significant digits, values that are not finite are ``null``. Files are
+replaced atomically.
 """
-
-from __future__ import annotations
 
 import json
 import math
@@ -16,50 +14,15 @@ from typing import Any
 
 import numpy as np
 
-SCHEMA = 1
-"""Version of the layout of ``report.json``."""
-DIGITS = 6
-"""Significant digits of a number in ``report.json``."""
-WIDTH = 100
-"""Longest line for a list or an object."""
-
-_KEYS = {
-    "": "schema verdict text causes rivals noise_floor held_out error_before error_after "
-    "residual_structure isolability experiment closed_loop closed_loop_reason calibration "
-    "not_testable warnings rule_version provenance runtime_s",
-    "causes": "name title form parameters gain effect size",
-    "held_out": "by kinds share",
-    "parameters": "name value unit interval neutral at_bound not_identified",
-    "rivals": "name title form held_out gain behind judged why excluded",
-    "judged": "gain better",
-    "residual_structure": "before after",
-    "r2": "direction rate pressure load time_since_reversal time temperature cycle",
-    "peak": "frequency_hz ratio",
-    "isolability": "names cosine absorbed",
-    "experiment": "between name description segments separation enough sensor",
-    "closed_loop": "controller where unit before after oracle better_percent recovered text",
-    "calibration": "name unit before after interval at_bound not_identified outside_tolerance",
-    "not_testable": "name reason",
-    "provenance": "recording rig plant_before plant_after package seed",
-    "*": "value unit from interval times_floor kinds contraction pressure "
-    "ljung_box_p r2 flexible_r2 peak",
-}
-ORDER = {key: tuple(names.split()) for key, names in _KEYS.items()}
-"""Order of the keys of an object, by the key of the object or of the list that contains it (``*``:
-of all others); further keys follow in their given order."""
+SCHEMA = 1  # version of the layout of ``report.json``
+DIGITS = 6  # significant digits of a number in ``report.json``
+WIDTH = 100  # longest line for a list or an object
 
 
 def plain(value: Any, key: str = "") -> Any:
-    """Return nested values in plain JSON types: keys in order, numbers rounded, None if not finite.
-
-    ``key`` is the key of the value, which selects the order of its own keys. Raises TypeError for
-    any other type.
-    """
+    """Return nested values as JSON types, numbers rounded, None if not finite; else TypeError."""
     if isinstance(value, Mapping):
-        first = ORDER.get(key, ORDER["*"])
-        names = [k for k in first if k in value]
-        names += [str(k) for k in value if k not in first]
-        return {k: plain(value[k], k) for k in names}
+        return {str(k): plain(v, str(k)) for k, v in value.items()}
     if isinstance(value, np.ndarray):
         return plain(value.tolist(), key)
     if isinstance(value, (list, tuple)):

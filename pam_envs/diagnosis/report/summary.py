@@ -1,7 +1,5 @@
 """Content of ``report.json``, and the verdict in a few sentences."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

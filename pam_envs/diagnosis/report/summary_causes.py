@@ -1,7 +1,5 @@
 """Causes, rivals and fitted parameters in the report."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,8 +19,7 @@ SCALE = {"contraction": 1e-3, "pressure": 1e5}
 BEST, OPEN, IMITATES = "the best", "not excluded", "imitates it"
 FEWER, MORE, SAME = "fewer causes", "more causes", "the same causes"
 LESS, WORSE, LITTLE = "gains less", "surely worse", "gains too little"
-EXCLUDED = (LESS, WORSE, LITTLE)
-"""Reasons of excluded rivals."""
+EXCLUDED = (LESS, WORSE, LITTLE)  # reasons of excluded rivals
 
 
 def seen(study: Any) -> list[tuple[int, str]]:

@@ -4,8 +4,6 @@ A missed setpoint is missed in every repeat. Its cells have a much larger predic
 their neighbours for a model fitted to all other pressures, at several loads alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,14 +15,10 @@ from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static.compare import Model, Study, pure_error
 from pam_envs.diagnosis.static.fit import fit
 
-OUTLYING = 3.5
-"""Robust standard deviations above which a held-out cell is an outlier."""
-SIZABLE = 2.0
-"""Least error of a reported setpoint in standard deviations of a reading,"""
-SIZABLE_SHARE = 0.01
-"""or as a share of the largest contraction if that deviation is unknown."""
-FEWEST_STEPS = 10
-"""Least number of pressures for an estimate of the usual error."""
+OUTLYING = 3.5  # robust standard deviations above which a held-out cell is an outlier
+SIZABLE = 2.0  # least error of a reported setpoint in standard deviations of a reading,
+SIZABLE_SHARE = 0.01  # or as a share of the largest contraction if that deviation is unknown
+FEWEST_STEPS = 10  # least number of pressures for an estimate of the usual error
 MOST_OUTLIERS = 3
 POOR_FIT = 1.3
 """Error of a curve over that of its refit above which it was fitted to other readings."""
@@ -32,17 +26,14 @@ POOR_FIT = 1.3
 
 @dataclass(frozen=True)
 class SetPoint:
-    """A pressure [bar], reached by deflation if ``falling``, with outliers at several loads [kg].
+    """A pressure with outliers at several loads."""
 
-    ``missed`` is reading less prediction from all other pressures at these loads [mm], ``others``
-    the same at the other loads.
-    """
-
-    pressure: float
-    falling: bool
-    loads: tuple[float, ...]
+    pressure: float  # [bar]
+    falling: bool  # reached by deflation
+    loads: tuple[float, ...]  # with outliers [kg]
+    # reading less prediction from all other pressures at these loads [mm]
     missed: tuple[float, ...]
-    others: tuple[float, ...]
+    others: tuple[float, ...]  # the same at the other loads
 
     @property
     def sentence(self) -> str:
@@ -130,24 +121,11 @@ def audit_polynomials(
 ) -> dict[str, object]:
     """Compare published polynomials with the readings that they describe.
 
-    Parameters
-    ----------
-    table : ContractionTable
-        Readings.
-    curves : mapping of str to (load [kg], inflating, coefficients)
-        Contraction [mm] over pressure [bar], highest power first, by the name of the equation.
-
-    Returns
-    -------
-    dict
-        ``equations``: for each its ``rms`` [mm] on its mean readings, that of a ``refit``, the
-        readings that it fits best (``best``), and the equation of which it is a copy
-        (``copy_of``); ``discrepancies``: sentences.
-
-    Raises
-    ------
-    ValueError
-        If the table lacks the load of a curve.
+    ``curves`` are load [kg], inflating, and coefficients (contraction [mm] over pressure [bar],
+    highest power first) by the name of the equation. Returns ``equations``, for each its ``rms``
+    [mm] on its mean readings, that of a ``refit``, the readings that it fits best (``best``), and
+    the equation of which it is a copy (``copy_of``); and ``discrepancies``, sentences. A ValueError
+    says that the table lacks the load of a curve.
     """
     equations = [_equation(table, name, *curve) for name, curve in curves.items()]
     for equation in equations:  # the one with the same coefficients that fits its readings better

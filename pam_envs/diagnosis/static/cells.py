@@ -1,7 +1,5 @@
 """Cells of a table of readings, and the play operators along its pressure paths."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,31 +11,24 @@ from pam_envs.diagnosis.arrays import Array, Flags, Indices
 
 THRESHOLDS = (1 / 24, 1 / 16, 1 / 12, 1 / 8, 3 / 16)
 """Thresholds of the play operators over the highest pressure."""
-BLOCK = 4
-"""Number of neighbouring cells of one branch that form a block."""
+BLOCK = 4  # number of neighbouring cells of one branch that form a block
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells of a table, shape (C,): one load and one step of a path each, with all repeats.
+    """Cells of a table, shape (C,): one load and one step of a path each, with all repeats."""
 
-    Load, pressure and mean contraction are relative to ``scale``, the largest load [kg], pressure
-    [Pa] and contraction [m]. Not ``used`` are readings that are zero by definition. A ``block``
-    (-1 if not used) contains neighbouring cells with dependent errors. ``group`` is an index into
-    ``loads`` [kg]; ``readings``, shape (R, C), are NaN where there are fewer repeats.
-    """
-
-    load: Array
+    load: Array  # relative to the scale, as pressure and mean contraction
     pressure: Array
     mean: Array
     falling: Flags
-    used: Flags
-    group: Indices
+    used: Flags  # not those that are zero by definition
+    group: Indices  # index into loads
     path: Indices
-    block: Indices
-    readings: Array
-    loads: tuple[float, ...]
-    scale: tuple[float, float, float]
+    block: Indices  # of neighbouring cells with dependent errors, -1 if not used
+    readings: Array  # (R, C), NaN where there are fewer repeats
+    loads: tuple[float, ...]  # [kg]
+    scale: tuple[float, float, float]  # largest load [kg], pressure [Pa], contraction [m]
 
     @cached_property
     def order(self) -> Indices:
@@ -110,10 +101,7 @@ def cells_of(table: ContractionTable) -> Cells:
 
 
 def stops(pressure: Array, order: Indices) -> Array:
-    """Return the lag of play operators behind the pressure from rest, shape (plays, L, C).
-
-    ``order`` is :attr:`Cells.order`; the pressure has the shape (L, C).
-    """
+    """Return the lag of play operators behind a pressure (L, C), shape (plays, L, C)."""
     lag = np.array(THRESHOLDS)[:, None, None]
     behind = np.zeros((len(THRESHOLDS), *pressure.shape))
     play = np.zeros((len(THRESHOLDS), len(pressure), order.shape[1]))

@@ -4,8 +4,6 @@ A held-out repeat tests a fit against noise, a held-out load tests the load law.
 neighbouring cells are dependent, so that tests and intervals use blocks of cells.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,29 +18,21 @@ from pam_envs.diagnosis.static.models import Term, predict
 
 Interval = tuple[float, float]
 
-PRESSURE_FOLDS = 6
-"""Number of folds of cells without repeats."""
+PRESSURE_FOLDS = 6  # number of folds of cells without repeats
 DRAWS, REFITS = 2000, 200
 """Bootstrap samples for an interval of an error, and refits for one of a parameter."""
-REFIT_GOOD = 1e-5
-"""Tolerance of such a refit, see :func:`improve`."""
+REFIT_GOOD = 1e-5  # tolerance of such a refit, see :func:`improve`
 
 
 @dataclass(frozen=True)
 class Lanes:
-    """Data sets of every model, fitted side by side: all data, then each fold left out.
+    """Data sets of every model, fitted side by side: all data, then each fold left out."""
 
-    ``data`` are means of the training data and ``weight`` the roots of their numbers of readings,
-    shape (1 + F + G, C); ``target``, shape (F, C), are the held-out readings of the first F folds
-    ("repeats", or "pressures" with one repeat), NaN elsewhere. Then G ``loads`` are held out in
-    turn, none of fewer than three.
-    """
-
-    kind: str
-    data: Array
-    weight: Array
-    target: Array
-    loads: int
+    kind: str  # "repeats", or "pressures" with one repeat
+    data: Array  # means of the training data, (1 + F + G, C)
+    weight: Array  # roots of their numbers of readings, (1 + F + G, C)
+    target: Array  # held-out readings of the first F folds, (F, C), NaN elsewhere
+    loads: int  # number G of loads that are held out in turn, none of fewer than three
 
 
 def _folds(cells: Cells, root: Array) -> tuple[str, Array, Array, Array]:
@@ -61,17 +51,12 @@ def _folds(cells: Cells, root: Array) -> tuple[str, Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Model:
-    """A fitted model with its errors on held-out data; the fit has the lanes of :class:`Lanes`.
-
-    ``residual`` is mean reading minus model fitted to all data [mm], shape (C,), NaN if not used;
-    ``held`` the mean squared error of each cell on held-out data [mm2], shape (C,); ``load_errors``
-    mean reading minus model on a held-out load [mm], shape (G, C), NaN elsewhere.
-    """
+    """A fitted model with its errors on held-out data; the fit has the lanes of :class:`Lanes`."""
 
     fit: Fit
-    residual: Array
-    held: Array
-    load_errors: Array
+    residual: Array  # mean reading minus model fitted to all data [mm], (C,), NaN if not used
+    held: Array  # mean squared error of each cell on held-out data [mm2], (C,)
+    load_errors: Array  # mean reading minus model on a held-out load [mm], (G, C), NaN elsewhere
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -129,10 +114,7 @@ class Study:
         return self.judged(fit(self.cells, (), lanes.data, lanes.weight, base_starts()))
 
     def extended(self, parents: Sequence[Model], terms: Sequence[Term], n: int = 0) -> Model:
-        """Return a model that contains all ``parents``, fitted to the first ``n`` lanes.
-
-        ``n`` of 0 means all lanes; with 1 there are no errors on held-out data.
-        """
+        """Return a model that contains all ``parents``, fitted to the first ``n`` lanes or all."""
         lanes, n = self.lanes, n or len(self.lanes.data)
         fits = [parent.fit.first(n) for parent in parents]
         return self.judged(extend(self.cells, fits, terms, lanes.data[:n], lanes.weight[:n]))
@@ -291,10 +273,7 @@ def lack_of_fit(study: Study, model: Model) -> tuple[float, float, float]:
 
 
 def pure_error(cells: Cells) -> tuple[float, int]:
-    """Return the standard deviation of repeats about their cell's mean [mm] and its freedom.
-
-    The deviation is NaN with one repeat or copies of one.
-    """
+    """Return the scatter of repeats [mm], NaN without differing ones, and its freedom."""
     apart = (cells.readings - cells.mean)[:, cells.used] * cells.millimetres
     free = int(np.maximum(cells.counts[cells.used] - 1, 0).sum())
     size = float(np.sqrt(np.nansum(apart**2) / max(free, 1)))
@@ -302,10 +281,7 @@ def pure_error(cells: Cells) -> tuple[float, int]:
 
 
 def floor(study: Study) -> Array:
-    """Return the mean squared difference [mm2] of a repeat from the mean of the others, (C,).
-
-    It is NaN with one repeat or copies of one.
-    """
+    """Return mean squared differences [mm2] of repeats from the others (C,), NaN without."""
     cells, lanes = study.cells, study.lanes
     if lanes.kind != "repeats" or np.isnan(pure_error(cells)[0]):
         return np.full(len(cells.load), np.nan)

@@ -6,8 +6,6 @@ load-blind model with hysteresis; rival causes one at a time and in pairs, judge
 repeats and loads; load law; pressures with implausible readings.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from typing import Any
@@ -25,25 +23,12 @@ __all__ = ["audit_polynomials", "diagnose_readings"]
 def diagnose_readings(table: ContractionTable, *, seed: int = 0) -> dict[str, Any]:
     """Diagnose the error of a load-blind muscle with hysteresis on a table of settled readings.
 
-    Parameters
-    ----------
-    table : ContractionTable
-        Settled readings: any loads, pressures and number of repeats.
-    seed : int
-        Seed of the resampling; the same table and seed give the same report except ``runtime_s``.
-
-    Returns
-    -------
-    dict
-        Report: ``verdict`` (``adequate``, ``named``, ``ambiguous``, ``unexplained`` or
-        ``insufficient``), ``text``, ``causes`` and so on; ``readings`` has the ``ladder`` of
-        models, ``pairs``, ``load_laws``, ``set_points`` and the ``curves`` of the figures. Keys
-        without meaning for a static table, and unknown values, are null.
-
-    Raises
-    ------
-    ValueError
-        If the table has no reading that could differ from zero.
+    The table has any loads, pressures and number of repeats; the same table and ``seed`` of the
+    resampling give the same report except ``runtime_s``. It has the ``verdict`` (``adequate``,
+    ``named``, ``ambiguous``, ``unexplained`` or ``insufficient``), ``text``, ``causes`` and so on;
+    ``readings`` has the ``ladder`` of models, ``pairs``, ``load_laws``, ``set_points`` and the
+    ``curves`` of the figures. Keys without meaning for a static table, and unknown values, are
+    null. A ValueError says that the table has no reading that could differ from zero.
     """
     start = time.perf_counter()
     cells = cells_of(table)

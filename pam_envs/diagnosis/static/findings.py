@@ -1,7 +1,5 @@
 """Results of a diagnosis of settled readings, and the verdict in a few sentences."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,26 +7,17 @@ import numpy as np
 
 from pam_envs.data.tables import ContractionTable
 from pam_envs.diagnosis.arrays import Array
+from pam_envs.diagnosis.static import compare
 from pam_envs.diagnosis.static.audit import SetPoint, missed_set_points
-from pam_envs.diagnosis.static.compare import (
-    Interval,
-    Model,
-    Study,
-    floor,
-    interval,
-    lack_of_fit,
-    parameter_draws,
-)
+from pam_envs.diagnosis.static.compare import floor
 from pam_envs.diagnosis.static.law import Law, NextLoads, load_laws, next_loads
 from pam_envs.diagnosis.static.models import Number, Term, units
 from pam_envs.diagnosis.static.search import LEVEL, Search
 from pam_envs.diagnosis.static.search import search as find_causes
 from pam_envs.diagnosis.static.structure import whiteness
 
-FLOOR_REACHED = 1.1
-"""Held-out error over the noise floor up to which a model is adequate."""
-WHITE = 0.01
-"""Without a noise floor: least p-value of white residuals."""
+FLOOR_REACHED = 1.1  # held-out error over the noise floor up to which a model is adequate
+WHITE = 0.01  # without a noise floor: least p-value of white residuals
 
 
 @dataclass(frozen=True)
@@ -36,7 +25,7 @@ class Findings:
     """Results of all stages, each computed when it is first read."""
 
     table: ContractionTable
-    study: Study
+    study: compare.Study
 
     @cached_property
     def search(self) -> Search:
@@ -46,7 +35,7 @@ class Findings:
     @cached_property
     def draws(self) -> Array:
         """Bootstrap samples of the parameters."""
-        return parameter_draws(self.study, self.model)
+        return compare.parameter_draws(self.study, self.model)
 
     @cached_property
     def laws(self) -> tuple[Law, ...]:
@@ -67,12 +56,12 @@ class Findings:
         return next_loads(self.study, *rivals[:2]) if several else None
 
     @property
-    def base(self) -> Model:
+    def base(self) -> compare.Model:
         """Load-blind model."""
         return self.study.base
 
     @property
-    def model(self) -> Model:
+    def model(self) -> compare.Model:
         """Model with the named causes."""
         return self.search.model
 
@@ -83,10 +72,10 @@ class Findings:
         seen = np.isfinite(squares)
         return float(np.sqrt(np.mean(squares[seen]))) if seen.any() else float("nan")
 
-    def estimate(self, name: str) -> tuple[float, Interval]:
+    def estimate(self, name: str) -> tuple[float, compare.Interval]:
         """Return a parameter of the model and its 95 % interval, in relative units."""
         k = self.model.fit.names.index(name)
-        return float(self.model.fit.theta[0, k]), interval(self.draws[:, k])
+        return float(self.model.fit.theta[0, k]), compare.interval(self.draws[:, k])
 
     @property
     def bent(self) -> bool:
@@ -130,7 +119,7 @@ def sentences(f: Findings) -> str:
         return " ".join(part for part in (_missed(f), _named(f), _loads(f), _left(f)) if part)
     if f.verdict == "adequate":
         return f"{_missed(f)} The load-blind model is adequate: the table shows no cause."
-    _, _, size = lack_of_fit(f.study, f.base)
+    _, _, size = compare.lack_of_fit(f.study, f.base)
     much = f" of {size:.2f} mm" if np.isfinite(size) else ""
     text = f"An error{much} beyond the repeats is left, which no known cause explains."
     return f"{_missed(f)} {text}"
@@ -188,7 +177,7 @@ def _left(f: Findings) -> str:
     held = f"{f.model.held_out:.2f} mm on held-out {f.study.lanes.kind}"
     if ratio <= FLOOR_REACHED:
         return f"The noise floor is reached: {held}."
-    f_value, _, size = lack_of_fit(f.study, f.model)
+    f_value, _, size = compare.lack_of_fit(f.study, f.model)
     return (
         f"The noise floor is not reached: {held} is {ratio:.1f} times it, {size:.2f} mm are not "
         f"explained by repeats (lack of fit F = {f_value:.0f})."

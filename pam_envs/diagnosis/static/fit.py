@@ -17,13 +17,10 @@ from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.models import Number, Term, lags_of, numbers_of, predict
 
-MOST_WEIGHT = 0.98
-"""Largest sum of the play weights: the muscle follows a reversal a little."""
+MOST_WEIGHT = 0.98  # largest sum of the play weights: the muscle follows a reversal a little
 ROUNDS = 60
-STEP = 0.02
-"""Step of finite differences over the meaningful size of a parameter."""
-GOOD = 1e-7
-"""Relative decrease of the sum of squares below which two steps end a lane."""
+STEP = 0.02  # step of finite differences over the meaningful size of a parameter
+GOOD = 1e-7  # relative decrease of the sum of squares below which two steps end a lane
 
 
 @dataclass(frozen=True)
@@ -165,13 +162,7 @@ def base_starts() -> list[Array]:
 def extend(
     cells: Cells, parents: Sequence[Fit], terms: Sequence[Term], data: Array, weight: Array
 ) -> Fit:
-    """Fit a model from the optima of its parents, with new parameters at and off neutral.
-
-    Raises
-    ------
-    RuntimeError
-        If the fit is worse than that of a parent: the optimiser failed.
-    """
+    """Fit a model from its parents, new parameters at and off neutral; RuntimeError if worse."""
     starts, numbers = [], numbers_of(terms)
     for parent in parents:
         known = dict(zip(parent.names, parent.theta.T, strict=True))

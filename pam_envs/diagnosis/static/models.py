@@ -11,8 +11,6 @@ largest of the table; :func:`units` gives the scales. All cells of a table are c
 many parameter sets (lanes).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -30,18 +28,14 @@ CREEP_READINGS = 4.0
 
 @dataclass(frozen=True)
 class Number:
-    """A parameter of a model, relative to the largest values of the table.
-
-    ``neutral`` is the value without effect (a plausible one in the base), ``size`` a meaningful
-    change, for finite differences and starting values; ``unit`` is the display unit.
-    """
+    """A parameter of a model, relative to the largest values of the table."""
 
     name: str
-    neutral: float
+    neutral: float  # value without effect; a plausible one in the base
     low: float
     high: float
-    size: float
-    unit: str = "1"
+    size: float  # meaningful change, for finite differences and starting values
+    unit: str = "1"  # for display
 
 
 @dataclass(frozen=True)
@@ -110,8 +104,7 @@ TERMS = (
 EXPONENT = Term("load law", "power", Number("exponent", 1.0, 0.3, 6.0, 0.3), loads=3)
 DEAD_LOAD = Term("load law", "dead zone", Number("dead_load", 0.0, 0.0, 0.95, 0.1, "kg"), loads=3)
 
-Values = Mapping[str, Array]
-"""Parameters by name, each of shape (L, 1); missing ones are neutral."""
+Values = Mapping[str, Array]  # parameters by name, each of shape (L, 1); missing ones are neutral
 
 
 def numbers_of(terms: Sequence[Term]) -> tuple[Number, ...]:
@@ -188,10 +181,7 @@ def crept(cells: Cells) -> Array:
 def predict(
     cells: Cells, values: Values, start: Array | None = None, lags: Array | None = None
 ) -> Array:
-    """Return the contractions of all cells in relative units, shape (L, C).
-
-    ``start`` are nearby contractions, ``lags`` those of :func:`lags_of`: both save time.
-    """
+    """Return contractions in relative units (L, C); nearby ``start`` and ``lags`` save time."""
     acts = load_law(cells.load, values)
     force = effective_pressure(cells, values, lags_of(cells, values) if lags is None else lags)
     for name in ("shift", "zeroed_shift"):

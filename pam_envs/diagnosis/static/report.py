@@ -1,7 +1,5 @@
 """Report of a diagnosis of settled readings."""
 
-from __future__ import annotations
-
 import hashlib
 from typing import Any
 
@@ -11,13 +9,7 @@ from pam_envs.data.tables import BAR, MM, ContractionTable
 from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.audit.tables import audit_table
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.static.compare import (
-    Model,
-    error_interval,
-    lack_of_fit,
-    load_cut,
-    pure_error,
-)
+from pam_envs.diagnosis.static import compare
 from pam_envs.diagnosis.static.findings import Findings, sentences
 from pam_envs.diagnosis.static.law import Law, separated
 from pam_envs.diagnosis.static.models import TERMS, Number, Term, predict, units
@@ -112,7 +104,7 @@ def _form(trial: Trial) -> Json:
 
 def causes(f: Findings) -> list[Json]:
     """Return the named causes in the order of evidence."""
-    noise, _ = pure_error(f.study.cells)
+    noise, _ = compare.pure_error(f.study.cells)
     made = []
     for trial in f.search.accepted:
         size = float(np.sqrt(np.mean(effect(f, trial.term)[f.study.cells.used] ** 2)))
@@ -149,7 +141,7 @@ def _rival(trial: Trial, chosen: bool) -> Json:
     }
 
 
-def error(f: Findings, model: Model) -> Json:
+def error(f: Findings, model: compare.Model) -> Json:
     """Return the error on held-out readings and loads."""
     loads = f.study.cells.loads[: f.study.lanes.loads]
     kinds = {f"{f.study.lanes.kind}, one held out": model.held_out, "cells, fitted": model.rms}
@@ -158,7 +150,7 @@ def error(f: Findings, model: Model) -> Json:
     if loads:
         kinds["loads, one held out (mean)"] = model.left_load
     more = {
-        "interval": list(error_interval(f.study, model.held)),
+        "interval": list(compare.error_interval(f.study, model.held)),
         "times_floor": model.held_out / f.floor,
         "kinds": kinds,
     }
@@ -290,7 +282,7 @@ def stage_of(stage: Stage) -> Json:
     }
 
 
-def _errors(model: Model) -> Json:
+def _errors(model: compare.Model) -> Json:
     return {
         "parameters": len(model.fit.numbers),
         "cells_mm": model.rms,
@@ -304,7 +296,7 @@ def loads_left_out(f: Findings) -> Json | None:
     """Return the decrease of the mean error on held-out loads by effects linear in load."""
     if not f.study.lanes.loads:
         return None
-    cut, (low, high) = load_cut(f.study, f.base, f.model)
+    cut, (low, high) = compare.load_cut(f.study, f.base, f.model)
     return {
         "before": _value(f.base.left_load),
         "after": _value(f.model.left_load),
@@ -325,9 +317,9 @@ def load_law(law: Law) -> Json:
     }
 
 
-def misfit(f: Findings, model: Model) -> Json:
+def misfit(f: Findings, model: compare.Model) -> Json:
     """Return the lack of fit: F and p-value against the repeats, and its size."""
-    ratio, p, size = lack_of_fit(f.study, model)
+    ratio, p, size = compare.lack_of_fit(f.study, model)
     return {"F": ratio, "p": p, "size": _value(size)}
 
 

@@ -6,8 +6,6 @@ held-out readings better by a relevant margin, and if it does not predict held-o
 Accepted causes are tested again beside later ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -17,38 +15,27 @@ import numpy as np
 from pam_envs.diagnosis.static.compare import Interval, Model, Study, gain, lack_of_fit, p_value
 from pam_envs.diagnosis.static.models import TERMS, Term
 
-RULE = "readings-1"
-"""Version of the decision rule."""
-LEVEL = 0.05
-"""Significance level over all forms of a stage."""
-LEAST_GAIN = 0.05
-"""Least relevant log ratio of held-out mean squares."""
-RIGHT = 0.005
-"""Without repeats: residual over the largest contraction that needs no explanation."""
-UNEXPLAINED = 0.01
-"""p-value of the lack of fit below which the search continues."""
-WORSE_LOADS = 1.02
-"""Largest factor by which a form may increase the error on held-out loads."""
+RULE = "readings-1"  # version of the decision rule
+LEVEL = 0.05  # significance level over all forms of a stage
+LEAST_GAIN = 0.05  # least relevant log ratio of held-out mean squares
+RIGHT = 0.005  # without repeats: residual over the largest contraction that needs no explanation
+UNEXPLAINED = 0.01  # p-value of the lack of fit below which the search continues
+WORSE_LOADS = 1.02  # largest factor by which a form may increase the error on held-out loads
 MOST_CAUSES = 4
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A form added to a model.
-
-    ``p`` is the p-value of this form alone (:func:`p_value`), one of those ``tried`` in a stage;
-    ``gain`` the log ratio of held-out mean squares to the model without it, ``behind`` that of the
-    stage's best form over this one, both with a 95 % interval.
-    """
+    """A form added to a model."""
 
     term: Term
     model: Model
-    p: float
-    tried: int
-    gain: float
-    interval: Interval
+    p: float  # p-value of this form alone
+    tried: int  # number of forms of the stage
+    gain: float  # log ratio of held-out mean squares to the model without it
+    interval: Interval  # 95 %
     loads_worse: bool
-    behind: float = 0.0
+    behind: float = 0.0  # the same of the stage's best form over this one
     behind_interval: Interval = (0.0, 0.0)
 
     @property
@@ -78,11 +65,11 @@ class Stage:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two causes fitted together: p-values of each added to the base, and added to the other."""
+    """Two causes fitted together."""
 
     terms: tuple[Term, Term]
-    alone: tuple[float, float]
-    beside: tuple[float, float]
+    alone: tuple[float, float]  # p-value of each added to the base
+    beside: tuple[float, float]  # p-value of each added to the other
 
     @property
     def masked(self) -> tuple[Term, ...]:
@@ -93,15 +80,12 @@ class Pair:
 
 @dataclass(frozen=True)
 class Search:
-    """Stages, the first on the base, every two causes in pairs, and the accepted model.
+    """Result of a search."""
 
-    The ``accepted`` forms are in the order of evidence.
-    """
-
-    stages: tuple[Stage, ...]
-    pairs: tuple[Pair, ...]
+    stages: tuple[Stage, ...]  # the first on the base
+    pairs: tuple[Pair, ...]  # of every two causes
     model: Model
-    accepted: tuple[Trial, ...]
+    accepted: tuple[Trial, ...]  # in the order of evidence
 
     @property
     def ties(self) -> list[tuple[Trial, Trial]]:

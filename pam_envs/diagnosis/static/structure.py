@@ -1,7 +1,5 @@
 """Structure of the residual of a static model, and isolability of its causes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -16,10 +14,8 @@ from pam_envs.diagnosis.static.search import available
 
 Json = dict[str, Any]
 
-LAGS = 6
-"""Number of lags of the whiteness test."""
-DEGREE = 3
-"""Degree of the flexible model, one polynomial for each load and branch."""
+LAGS = 6  # number of lags of the whiteness test
+DEGREE = 3  # degree of the flexible model, one polynomial for each load and branch
 
 
 def whiteness(cells: Cells, model: Model) -> float:

@@ -53,7 +53,7 @@ class Common:
         Hysteresis model of the muscles. Default: that of ``plant``, or Maxwell-slip.
     hysteresis_drive : {"length", "pressure"}, optional
         Input of the hysteresis: friction driven by length is passive, the papers' forms create
-        energy. Default: that of ``plant``, or "pressure".
+        energy. Default: that of ``plant``; else "length", for the knee "pressure".
     plant : plant or path, optional
         Plant of the environment's family, as an object or a YAML file. Default: the published one.
     reference : str or array_like
@@ -97,10 +97,11 @@ class Common:
         check_whole("preview_stride", self.preview_stride, 1, 1000)
         check_number("episode_seconds", self.episode_seconds, 0.02, 3600.0, "s")
 
-    def plant_of(self, kind: type[T], default: Callable[[Any], T]) -> T:
-        """Return the plant that ``plant`` and ``hysteresis`` name; default: of a hysteresis.
+    def plant_of(self, kind: type[T], default: Callable[[Any], T], usual: str = DRIVES[0]) -> T:
+        """Return the plant that ``plant``, ``hysteresis`` and ``hysteresis_drive`` name.
 
-        ``default`` takes the hysteresis and its drive.
+        Without ``plant`` it is ``default`` of a kind of hysteresis: of the model's form with the
+        drive ``usual``, where there is one and no other drive is given.
         """
         plant, hysteresis, drive = self.plant, self.hysteresis, self.hysteresis_drive
         if drive is not None:
@@ -108,7 +109,7 @@ class Common:
         if hysteresis is not None:
             check_choice("hysteresis", hysteresis, kinds())
         if plant is None:
-            return default(kind_of(hysteresis or "maxwell_slip", drive or "pressure"))
+            return default(kind_of(hysteresis or "maxwell_slip", drive, usual))
         made: Any = kind.from_yaml(plant) if isinstance(plant, (str, Path)) else plant  # type: ignore[attr-defined]
         if not isinstance(made, kind):
             raise ValueError(

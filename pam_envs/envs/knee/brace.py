@@ -85,7 +85,7 @@ def make_setup(
     start : {"random", "paper"}
         At rest under a random pressure, or at about 55 N.
     """
-    made = given.plant_of(KneeOrthosis, default_plants[mounting])
+    made = given.plant_of(KneeOrthosis, default_plants[mounting], usual="pressure")
     if made.mounting == "leg":
         raise ValueError(
             "plant: this orthosis is on a leg; give KneeOrthosis.no_load() or KneeOrthosis.rig()"

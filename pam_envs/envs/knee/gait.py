@@ -100,7 +100,9 @@ def _plant(activity: Activity, given: Common, pace: Any, **kinds: str | None) ->
     stride = PACES.get("slow" if pace is None else pace, pace)
     seconds = check_number("pace", stride, 0.8, 20.0, "s a stride")
     made = given.plant_of(
-        KneeOrthosis, lambda kind: default_plant(activity, stride=seconds, hysteresis=kind)
+        KneeOrthosis,
+        lambda kind: default_plant(activity, stride=seconds, hysteresis=kind),
+        usual="pressure",
     )
     if made.mounting != "leg" or made.activity != activity:
         raise ValueError(

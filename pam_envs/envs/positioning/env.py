@@ -1,8 +1,9 @@
 """``PAM/MusclePositioning-v0``: position a hanging load with one pneumatic muscle.
 
-A Festo MAS-10-N-100 lifts a load. The action is the setpoint of its pressure regulator; the task
-is to make the contraction follow a reference. The muscle has hysteresis: at the same pressure, the
-contractions during inflation and deflation differ by up to 3.3 mm on a stroke of 15 mm.
+A Festo MAS-10-N-100 lifts a load. The action is the setpoint of its pressure regulator, which has a
+dead time, a rate limit and a lag; the task is to make the contraction follow a reference. The
+muscle has hysteresis, friction driven by its length: at the same pressure, the contractions during
+inflation and deflation differ by up to 3.3 mm on a stroke of 15 mm.
 
 Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``):
 

@@ -18,7 +18,7 @@ from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, FIRST_CHOICE, FIRST_CONFIG, PERIOD
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.kernels.history import N_HISTORY
+from pam_envs.kernels.history import fill_ring
 from pam_envs.kernels.random import uniform
 from pam_envs.muscle.effective_area import volume
 from pam_envs.parameters import declarations
@@ -76,7 +76,10 @@ write_drive: Any = None  # a placeholder, replaced for each hysteresis
 def air_in_muscle(rows: Any, fixed: Any, j: int) -> float:
     """Return the mass of air [kg] in the muscle of lane ``j``."""
     length = fixed[R.MUSCLE_REST_LENGTH][j]
-    space = volume(rows[R.CONTRACTION][j] / length, length, fixed[R.TALL][j], fixed[R.COSINE][j])
+    space = volume(
+        rows[R.CONTRACTION][j] / length, length, fixed[R.MUSCLE_DIAMETER][j],
+        fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j], fixed[R.MUSCLE_AREA_CURVE][j],
+    )  # fmt: skip
     return DENSITY_PER_PRESSURE * (rows[R.PRESSURE][j] + ATMOSPHERE) * space
 
 
@@ -144,8 +147,7 @@ def begin_muscle(
         rows[R.PRESSURE][j] = pressure
         write_drive(rows, fixed, counts, tables, HYSTERESIS, j, j + 1, elements, work)
         slide_to_rest(rows, fixed, counts, tables, HYSTERESIS, elements, j)
-    for k in range(N_HISTORY):
-        rows[R.HISTORY + k][j] = begin
+    fill_ring(rows, R.HISTORY, j, begin)
     rows[R.SET_POINT][j] = rows[R.OLD_SET_POINT][j] = rows[R.OLD_PRESSURE][j] = begin
     rows[R.OLD_AIR][j] = air_in_muscle(rows, fixed, j)
     begin_effects(rows, fixed, j)

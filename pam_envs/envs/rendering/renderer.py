@@ -4,8 +4,6 @@ Drawn with pygame-ce on a plain surface, so that ``rgb_array`` needs no display.
 ``info`` of the steps and does not change the simulation.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections import deque
@@ -17,28 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.rendering.scene import (
-    INK,
-    MUTED,
-    OUTPUT,
-    PAPER,
-    PRESSURE,
-    REFERENCE,
-    Axes,
-    Color,
-    Point,
-    Strip,
-    pressure_loop,
-    view_of,
-)
+from pam_envs.envs.rendering import scene
 
 SIZE = (800, 600)
-SCALE = 2
-"""Everything is drawn this many times larger and smoothed down, for anti-aliased edges."""
+SCALE = 2  # everything is drawn this many times larger and smoothed down, for anti-aliased edges
 STRIP_SECONDS = 8.0
 LOOP_SAMPLES = 1500
-WINDOW_FPS = 50
-"""Pictures per second in the window, at the pace of the plant."""
+WINDOW_FPS = 50  # pictures per second in the window, at the pace of the plant
 
 
 def _pygame() -> Any:
@@ -66,20 +49,20 @@ class Canvas:
 
     def clear(self) -> None:
         """Start a new picture."""
-        self.surface.fill(PAPER)
+        self.surface.fill(scene.PAPER)
 
-    def line(self, points: Iterable[Point], color: Color, width: float = 1.5) -> None:
+    def line(self, points: Iterable[scene.Point], color: scene.Color, width: float = 1.5) -> None:
         """Draw a line through points."""
         scaled = [(x * SCALE, y * SCALE) for x, y in points]
         if len(scaled) > 1:
             self.pygame.draw.lines(self.surface, color, False, scaled, max(1, round(width * SCALE)))
 
-    def polygon(self, points: Iterable[Point], color: Color) -> None:
+    def polygon(self, points: Iterable[scene.Point], color: scene.Color) -> None:
         """Fill a polygon."""
         self.pygame.draw.polygon(self.surface, color, [(x * SCALE, y * SCALE) for x, y in points])
 
     def rectangle(
-        self, box: tuple[float, float, float, float], color: Color, round_: int = 0
+        self, box: tuple[float, float, float, float], color: scene.Color, round_: int = 0
     ) -> None:
         """Fill a rectangle given by left, top, width and height."""
         self.pygame.draw.rect(
@@ -93,12 +76,12 @@ class Canvas:
         yield
         self.surface.set_clip(None)
 
-    def disc(self, centre: Point, radius: float, color: Color) -> None:
+    def disc(self, centre: scene.Point, radius: float, color: scene.Color) -> None:
         """Fill a circle."""
         middle = (centre[0] * SCALE, centre[1] * SCALE)
         self.pygame.draw.circle(self.surface, color, middle, radius * SCALE)
 
-    def dashed(self, a: Point, b: Point, color: Color) -> None:
+    def dashed(self, a: scene.Point, b: scene.Point, color: scene.Color) -> None:
         """Draw a dashed line."""
         length = math.dist(a, b)
         for start in np.arange(0.0, length, 10.0):
@@ -108,7 +91,12 @@ class Canvas:
             )
 
     def text(
-        self, words: str, place: Point, color: Color = INK, size: int = 13, align: str = "left"
+        self,
+        words: str,
+        place: scene.Point,
+        color: scene.Color = scene.INK,
+        size: int = 13,
+        align: str = "left",
     ) -> None:
         """Write text, with ``place`` at the left, centre or right of their upper edge."""
         if size not in self._fonts:
@@ -128,7 +116,7 @@ class Renderer:
     def __init__(self, env: Any, canvas: Canvas | None = None) -> None:
         self.env = env
         self.canvas = Canvas() if canvas is None else canvas
-        self.view = view_of(env)
+        self.view = scene.view_of(env)
         strips = self.view.strips
         self._keys = ("time", *dict.fromkeys(key for strip in strips for key, _, _ in strip.lines))
         self.strip: deque[tuple[float, ...]] = deque(
@@ -155,14 +143,14 @@ class Renderer:
         self._draw_numbers()
         points, first = list(self.loop), self.view.strips[0]
         if self.view.panel is None:
-            pressure_loop(self.canvas, self.env.plant, first, points)
+            scene.pressure_loop(self.canvas, self.env.plant, first, points)
         else:
             self.view.panel(self.canvas, self.env, self.info, points)
         start = max(0.0, self.strip[-1][0] - STRIP_SECONDS)
         for strip in self.view.strips:
             self._draw_strip(strip, (start, start + STRIP_SECONDS))
-        self.canvas.text("reference", (712, first.top - 21), REFERENCE, 12, "right")
-        self.canvas.text("output", (770, first.top - 21), OUTPUT, 12, "right")
+        self.canvas.text("reference", (712, first.top - 21), scene.REFERENCE, 12, "right")
+        self.canvas.text("output", (770, first.top - 21), scene.OUTPUT, 12, "right")
         return self.canvas.picture()
 
     def _draw_numbers(self) -> None:
@@ -170,21 +158,21 @@ class Renderer:
         error = first.scale * (info["output"] - info["reference"])
         name, unit, number = self.view.number
         for x, title, value, color in (
-            (360, "time", f"{info['time']:.2f} s", INK),
-            (475, "error", f"{error:+.2f} {first.unit}", INK),
-            (600, name, f"{number(info):.2f} {unit}", PRESSURE),
+            (360, "time", f"{info['time']:.2f} s", scene.INK),
+            (475, "error", f"{error:+.2f} {first.unit}", scene.INK),
+            (600, name, f"{number(info):.2f} {unit}", scene.PRESSURE),
         ):
-            text(title, (x, 14), MUTED, 11)
+            text(title, (x, 14), scene.MUTED, 11)
             text(value, (x, 29), color, 16)
         if info["saturated"]:
-            text("action", (770, 14), REFERENCE, 11, "right")
-            text("clipped", (770, 29), REFERENCE, 16, "right")
+            text("action", (770, 14), scene.REFERENCE, 11, "right")
+            text("clipped", (770, 29), scene.REFERENCE, 16, "right")
 
-    def _draw_strip(self, strip: Strip, seconds: Point) -> None:
+    def _draw_strip(self, strip: scene.Strip, seconds: scene.Point) -> None:
         """Draw one plot of the last seconds; the lowest one has the time axis."""
         lowest, (span, across, name) = strip is self.view.strips[-1], strip.axis(self.env.plant)
         whole = range(2 * math.ceil(0.5 * seconds[0]), math.floor(seconds[1]) + 1, 2)
-        axes = Axes(self.canvas, (360, strip.top, 410, strip.height), seconds, span)
+        axes = scene.Axes(self.canvas, (360, strip.top, 410, strip.height), seconds, span)
         axes.frame(whole, across, "time [s]" if lowest else "", name, numbers=lowest)
         for key, color, width in strip.lines:
             k = self._keys.index(key)

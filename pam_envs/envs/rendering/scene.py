@@ -34,21 +34,17 @@ def blend(a: Color, b: Color, share: float) -> Color:
 
 @dataclass(frozen=True)
 class Strip:
-    """Plot of the last seconds, at a height in the picture [pixels].
-
-    ``lines`` holds key of ``info``, colour and width of each line, ``scale`` is the value in the
-    unit divided by the SI value. ``span`` and ``ticks`` of the axis, in the unit, are constants or
-    functions of the plant.
-    """
+    """Plot of the last seconds, at a height in the picture [pixels]."""
 
     name: str
     unit: str
-    scale: float
-    lines: Sequence[tuple[str, Color, float]]
+    scale: float  # value in the unit over the SI value
+    lines: Sequence[tuple[str, Color, float]]  # key of info, colour and width of each
     top: int
     height: int
+    # of the axis, in the unit; a constant or a function of the plant
     span: Point | Callable[[Any], Point]
-    ticks: Sequence[float] | Callable[[Any], Sequence[float]]
+    ticks: Sequence[float] | Callable[[Any], Sequence[float]]  # likewise
 
     def axis(self, plant: Any) -> tuple[Point, Sequence[float], str]:
         """Return lowest and highest value, the grid lines and the name."""
@@ -58,8 +54,7 @@ class Strip:
 
 
 Trace = Sequence[tuple[float, ...]]
-Policy = Callable[[Any], Any]
-"""Returns the action for an observation."""
+Policy = Callable[[Any], Any]  # returns the action for an observation
 
 
 @dataclass(frozen=True)
@@ -116,8 +111,7 @@ def pressure_strip(
     return Strip(name, "bar", 1e-5, lines, top, height, lambda p: (0.0, full_bar(p)), ticks)
 
 
-PANEL: Box = (360, 88, 410, 200)
-"""Position and size of the plot above the strips."""
+PANEL: Box = (360, 88, 410, 200)  # position and size of the plot above the strips
 
 
 def draw_loop(canvas: Canvas, points: Trace, axes: Axes, scale: float = 1.0) -> None:

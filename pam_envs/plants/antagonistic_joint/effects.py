@@ -12,7 +12,7 @@ from typing import Any
 from pam_envs.kernels.build import kernel
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.pair import N_PAIRS, PAIR, friction_kernels, pair_rows
-from pam_envs.plants.core.muscle_path import PATH_STATE, begin_path, path_step
+from pam_envs.plants.core.muscle_path import DELAYED, PATH_STATE, begin_path, path_step
 from pam_envs.plants.core.sensors import effect_kernels
 
 FULL_ANGLE, FULL_PRESSURE = 0.5236, 6.5e5
@@ -25,9 +25,9 @@ def regulate_extended(
 ) -> None:
     """Advance pressure and effective pressure of muscle ``m`` of a tile through a sub-step."""
     path_step(
-        rows, fixed, PAIR.paths + m * PATH_STATE.end, PAIR.path, K.REGULATOR_MAX_PRESSURE,
-        PAIR.warm, rows[PAIR.pressure + m], rows[PAIR.set_point + m], rows[PAIR.effective + m],
-        work[m], counts[K.STEP], i, substeps, period,
+        rows, fixed, PAIR.paths + m * PATH_STATE.end, PAIR.path, PAIR.delay + m * DELAYED.end,
+        K.REGULATOR_MAX_PRESSURE, PAIR.warm, rows[PAIR.pressure + m], rows[PAIR.set_point + m],
+        rows[PAIR.effective + m], work[m], counts[K.STEP], i, substeps, period,
     )  # fmt: skip
 
 

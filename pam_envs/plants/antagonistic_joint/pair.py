@@ -15,7 +15,7 @@ from pam_envs.mechanics.antagonistic_lever import span, squares
 from pam_envs.muscle.force_map import force_terms, inner_volume
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.hysteresis import REFERENCE_PRESSURE
-from pam_envs.plants.core.muscle_path import regulated
+from pam_envs.plants.core.muscle_path import DELAYED, begin_delay, follow_set_point
 from pam_envs.plants.core.sensors import read_sensors
 
 PAIR: Any = None
@@ -31,7 +31,7 @@ report_state: Any = None
 
 ROWS = (
     "angle velocity pressure set_point command prestress force contraction lag at stick torque "
-    "stiffness straight air slack model"
+    "stiffness straight air slack delay model"
 )
 """Rows of a plant that these kernels read: of joint ``k`` the row of the first and ``k``, of
 muscle ``m`` that of the first and ``m``."""
@@ -65,10 +65,19 @@ def regulate(
 ) -> None:
     """Advance the pressure of muscle ``m`` of a tile through a sub-step; keep those before."""
     pressure, set_point, was = rows[PAIR.pressure + m], rows[PAIR.set_point + m], work[m]
-    h = period / substeps
     for j in range(LANES):
         was[j] = pressure[j]
-        pressure[j] = regulated(fixed, K.REGULATOR_MAX_PRESSURE, j, pressure[j], set_point[j], h)
+    follow_set_point(
+        rows, fixed, PAIR.delay + m * DELAYED.end, K.REGULATOR_MAX_PRESSURE, pressure, set_point,
+        counts[K.STEP], i, substeps, period,
+    )  # fmt: skip
+
+
+@kernel
+def begin_delays(rows: Any, j: int) -> None:
+    """Begin the dead times of all muscles of lane ``j`` under its setpoints."""
+    for m in range(2 * N_PAIRS):
+        begin_delay(rows, j, PAIR.delay + m * DELAYED.end, rows[PAIR.set_point + m][j])
 
 
 @kernel
@@ -94,7 +103,7 @@ def advance(
         move(rows, fixed, counts, table, hysteresis, elements, h, work)
     for j in range(LANES):
         report_state(rows, fixed, j)
-        read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
+    read_sensors(rows, fixed, counts[K.STEP], period)
 
 
 @kernel

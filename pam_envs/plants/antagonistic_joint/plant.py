@@ -5,7 +5,8 @@
     J phi'' + D phi' = -F_A dL_A/dphi - F_B dL_B/dphi - m g c sin(phi) + disturbance
 
 Without hysteresis, gravity and load the feedforward makes the angle at rest the commanded one; the
-regulators' lag and the damped stiffness of the muscles are then two real poles near 23 rad/s. The
+regulators' lag and the damped stiffness of the muscles are then two real poles near 23 rad/s,
+behind the regulators' dead time and below their rate limit, which the paper does not have. The
 paper's reduced plant, a Preisach operator and two poles, is the variant ``dynamics="reduced"``.
 
 Effects (off unless set, ``AntagonisticJoint.effects``): of both regulators and muscles, of the
@@ -70,6 +71,11 @@ class AntagonisticJoint(PairPlant, rows=K):
     angle: JointEncoder = field(default_factory=JointEncoder)
     pressure: GaugeSensor = field(default_factory=GaugeSensor)
 
+    @property
+    def dead_time(self) -> float:
+        """Dead time [s] from a setpoint to the pressure."""
+        return 0.0 if self.dynamics == "reduced" else self.regulator.dead_time
+
     def _check(self) -> None:
         """Refuse angles out of reach, and a motion that the sub-steps cannot follow."""
         super()._check()
@@ -89,13 +95,14 @@ class AntagonisticJoint(PairPlant, rows=K):
     # --- presets --------------------------------------------------------------------------------
 
     @classmethod
-    def paper(cls, hysteresis: str = "maxwell_slip", **changes: float) -> AntagonisticJoint:
+    def paper(cls, hysteresis: str = "maxwell_slip_length", **changes: float) -> AntagonisticJoint:
         """Return the joint whose muscles end at 25 % contraction, as fluidic_muscles has it.
 
         Parameters
         ----------
-        hysteresis : {"maxwell_slip", "preisach", "none"}
-            Hysteresis model; both operators have the same loops.
+        hysteresis : {"maxwell_slip_length", "preisach_length", "none"}
+            Kind of the hysteresis: driven by length as here, or ``"maxwell_slip"`` and
+            ``"preisach"``, driven by pressure. All have the same loops at one pressure.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``hysteresis__width=0.5``).
         """
@@ -107,7 +114,9 @@ class AntagonisticJoint(PairPlant, rows=K):
         return plant.changed(changes)
 
     @classmethod
-    def measured(cls, hysteresis: str = "maxwell_slip", **changes: float) -> AntagonisticJoint:
+    def measured(
+        cls, hysteresis: str = "maxwell_slip_length", **changes: float
+    ) -> AntagonisticJoint:
         """Return the joint with muscles as measured, limited to the angle that it reaches.
 
         The limit is the angle that full pressure reaches at the nominal co-contraction, against

@@ -23,6 +23,7 @@ from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.effects import pair_kernels
 from pam_envs.plants.antagonistic_joint.pair import (
     PAIR,
+    begin_delays,
     begin_muscles,
     command,
     contract,
@@ -36,7 +37,7 @@ from pam_envs.plants.antagonistic_joint.pair import (
     stop_torque,
     turning,
 )
-from pam_envs.plants.core.sensors import read_sensors
+from pam_envs.plants.core.sensors import begin_sensors
 
 N_WORK = 6
 """Rows of scratch: pressures before the sub-step, rates and curvatures at its middle."""
@@ -147,11 +148,12 @@ def begin_lane(
     straight, _, _ = lever_of(fixed, j, 0.0, 1.0)
     rows[K.STRAIGHT][j] = straight
     rows[K.LAG_A][j] = rows[K.LAG_A + 1][j] = 0.0
+    begin_delays(rows, j)
     begin_muscles(rows, fixed, j)
     rest(rows, fixed, counts, table, hysteresis, elements, j)
     rows[K.VELOCITY][j] = 0.0
     report_state(rows, fixed, j)
-    read_sensors(rows, fixed, j, 0, 0.0)
+    begin_sensors(rows, fixed, j)
 
 
 @kernel

@@ -3,7 +3,8 @@
     setpoint -> dead time -> regulator, supply, leak -> line -> creep -> temperature, first cycles
 
 For plants whose hysteresis follows the contraction; each muscle has a state of its own, and all
-muscles of a plant share the parameters.
+muscles of a plant share the parameters. A plain plant has dead time and regulator
+(:func:`follow_set_point`), an extended one all of the path (:func:`path_step`).
 """
 
 from __future__ import annotations
@@ -17,85 +18,125 @@ from pam_envs.hysteresis.friction_effects import (
     creep_step,
     newness,
 )
-from pam_envs.kernels.build import LANES, kernel, scratch
-from pam_envs.kernels.history import N_HISTORY
+from pam_envs.kernels.arithmetic import count_on
+from pam_envs.kernels.build import LANES, kernel, routine, scratch
+from pam_envs.kernels.history import N_HISTORY, fill_ring
 from pam_envs.muscle.effects import TemperatureEffects, temperature_factor
-from pam_envs.parameters import declarations, parameter_rows, row_blocks
+from pam_envs.parameters import declarations, named_rows, parameter_rows, row_blocks
 from pam_envs.pneumatics.regulator import (
     AIR_STATE,
-    DelayedEffects,
+    RegulatorEffects,
     air_step,
     begin_air,
     delay_commands,
-    delayed_fraction,
+    late_shares,
     line_effects_on,
     regulator_step,
+    stage_widths,
     valve_effects_on,
 )
 
-PATH = parameter_rows(DelayedEffects, CreepEffects, FirstCycles)
+REGULATOR = named_rows("max_pressure", "dead_time", "time_constant", "slew_rate")
+"""Rows of a regulator's plain parameters, from the first."""
+DELAYED = row_blocks(commands=N_HISTORY, older=1, newer=1, switch=1)
+"""State of a dead time, from its first row: the last setpoints; the two that take effect in a
+control period [Pa], and the time between them [s]."""
+PATH = parameter_rows(RegulatorEffects, CreepEffects, FirstCycles)
 """Rows of the effects that all muscles of a plant share, from the first."""
 WARM = parameter_rows(TemperatureEffects)
 """Rows of the temperature of a muscle and its effect, from the first."""
-PATH_STATE = row_blocks(air=len(AIR_STATE), commands=N_HISTORY, travel=1, creep=4)
+PATH_STATE = row_blocks(air=len(AIR_STATE), travel=1, creep=4)
 """State of a muscle's path, from its first row."""
 PATH_NAMES = (
-    *(f"regulator.{name}" for name in declarations(DelayedEffects)),
+    *(f"regulator.{name}" for name in declarations(RegulatorEffects)),
     *(f"hysteresis.{name}" for name in (*declarations(CreepEffects), *declarations(FirstCycles))),
 )
 """Parameters of the path in the order of ``PATH``."""
 
 
 @kernel
-def regulated(fixed: Any, plain: int, j: int, pressure: float, set_point: float, h: float) -> float:
-    """Return the pressure [Pa] of one lane after ``h`` seconds, without effects.
-
-    ``plain`` is the first row of full pressure, time constant and slew rate.
-    """
-    time, slew = fixed[plain + 1][j], fixed[plain + 2][j]
-    target = max(0.0, min(fixed[plain][j], set_point))
-    return regulator_step(pressure, target, time, 1.0 / time, slew, 1.0 / slew, h)
+def delay(
+    rows: Any, fixed: Any, delayed: int, plain: int, set_point: Any, step: Any, period: float
+) -> None:
+    """Note the setpoints [Pa] of a tile, and write those that take effect in a control period."""
+    older, newer = rows[delayed + DELAYED.older], rows[delayed + DELAYED.newer]
+    delay_commands(
+        rows, delayed + DELAYED.commands, set_point, fixed[plain + REGULATOR.dead_time], step,
+        period, older, newer, rows[delayed + DELAYED.switch],
+    )  # fmt: skip
+    full = fixed[plain + REGULATOR.max_pressure]
+    for j in range(LANES):
+        older[j], newer[j] = min(full[j], older[j]), min(full[j], newer[j])
 
 
 @kernel
-def path_air(
-    rows: Any, fixed: Any, state: int, effects: int, plain: int, pressure: Any, set_point: Any,
-    step: Any, i: int, substeps: int, period: float,
-) -> None:  # fmt: skip
-    """Advance the pressures of one muscle of a tile through sub-step ``i``.
+def begin_delay(rows: Any, j: int, delayed: int, set_point: float) -> None:
+    """Begin the dead time of one lane under a setpoint [Pa] that was held."""
+    fill_ring(rows, delayed + DELAYED.commands, j, set_point)
 
-    ``state``, ``effects`` and ``plain`` are the first rows of the path's state (``PATH_STATE``), of
-    its effects (``PATH``), and of full pressure, time constant and slew rate; ``pressure``,
-    ``set_point`` [Pa] (below zero: the valve is shut) and ``step`` are rows.
+
+@routine
+def follow_set_point(
+    rows: Any, fixed: Any, delayed: int, plain: int, pressure: Any, set_point: Any, step: Any,
+    i: int, substeps: int, period: float,
+) -> None:  # fmt: skip
+    """Advance the pressures of one muscle of a tile through sub-step ``i``, without effects.
+
+    ``delayed`` and ``plain`` are the first rows of the dead time's state (``DELAYED``) and of the
+    regulator (``REGULATOR``); ``pressure``, ``set_point`` [Pa] and ``step`` are rows.
     """
-    h = period / substeps
-    own = scratch(6, LANES)
-    older, newer, switch, width = own[2], own[3], own[4], own[5]
-    full, lag, slew = fixed[plain], fixed[plain + 1], fixed[plain + 2]
-    delay_commands(
-        rows, state + PATH_STATE.commands, set_point, fixed[effects + PATH.dead_time], step, period,
-        older, newer, switch,
-    )  # fmt: skip
-    valve, lines = valve_effects_on(fixed, effects), line_effects_on(fixed, effects)
-    for j in range(LANES):
-        older[j], newer[j] = min(full[j], older[j]), min(full[j], newer[j])
+    if i == 0:
+        delay(rows, fixed, delayed, plain, set_point, step, period)
+    lag, slew = fixed[plain + REGULATOR.time_constant], fixed[plain + REGULATOR.slew_rate]
+    own = scratch(2, LANES)
+    late, width = own[0], own[1]
+    late_shares(rows[delayed + DELAYED.switch], i, substeps, period, late)
     for stage in range(2):  # towards the older setpoint, then towards the newer one
-        busy = 0
+        if stage_widths(late, stage, period / substeps, width) == 0:
+            continue
+        target = rows[delayed + (DELAYED.newer if stage == 1 else DELAYED.older)]
         for j in range(LANES):
-            late = delayed_fraction((i + 1) * h, substeps / period, switch[j])
-            width[j] = h * (late if stage == 1 else 1.0 - late)
-            busy = busy + (1 if width[j] > 0.0 else 0)
-        if busy == 0:
+            reached = regulator_step(
+                pressure[j], max(0.0, target[j]), lag[j], 1.0 / lag[j], slew[j], 1.0 / slew[j],
+                width[j],
+            )  # fmt: skip
+            pressure[j] = reached if width[j] > 0.0 else pressure[j]
+
+
+@routine
+def path_air(
+    rows: Any, fixed: Any, state: int, effects: int, delayed: int, plain: int, pressure: Any,
+    set_point: Any, step: Any, i: int, substeps: int, period: float,
+) -> None:  # fmt: skip
+    """Advance the pressures of one muscle of a tile through sub-step ``i``, with all effects.
+
+    ``state`` and ``effects`` are the first rows of the path's state (``PATH_STATE``) and of its
+    effects (``PATH``); a setpoint below zero shuts the valve. See :func:`follow_set_point`.
+    """
+    if i == 0:
+        delay(rows, fixed, delayed, plain, set_point, step, period)
+    own = scratch(4, LANES)
+    late, width = own[2], own[3]
+    full, lag, slew = (
+        fixed[plain + REGULATOR.max_pressure],
+        fixed[plain + REGULATOR.time_constant],
+        fixed[plain + REGULATOR.slew_rate],
+    )
+    valve, lines = valve_effects_on(fixed, effects), line_effects_on(fixed, effects)
+    late_shares(rows[delayed + DELAYED.switch], i, substeps, period, late)
+    for stage in range(2):  # towards the older setpoint, then towards the newer one
+        if stage_widths(late, stage, period / substeps, width) == 0:
             continue
         air_step(
             rows, fixed, state + PATH_STATE.air, effects, pressure, full, lag, slew,
-            newer if stage == 1 else older, width, own, valve, lines,
+            rows[delayed + (DELAYED.newer if stage == 1 else DELAYED.older)], width, own, valve,
+            lines,
         )  # fmt: skip
         for j in range(LANES):
             rows[state + PATH_STATE.travel][j] += abs(pressure[j] - own[1][j])
 
 
-@kernel
+@routine
 def path_muscle(
     rows: Any, fixed: Any, state: int, effects: int, warm: int, pressure: Any, h: float, crept: Any,
     factor: Any,
@@ -109,12 +150,22 @@ def path_muscle(
     for j in range(LANES):
         width[0][j] = h
         crept[j] = 0.0
+        factor[j] = 1.0
     creep_step(
         rows, fixed, state + PATH_STATE.creep, effects + PATH.creep_1, effects + PATH.creep_time_1,
         0, LANES, pressure, width[0], crept,
     )  # fmt: skip
-    for j in range(LANES):
-        factor[j] = path_factor(rows, fixed, j, state, effects, warm)
+    if factors_on(fixed, effects, warm) > 0:
+        for j in range(LANES):
+            factor[j] = path_factor(rows, fixed, j, state, effects, warm)
+
+
+@kernel
+def factors_on(fixed: Any, effects: int, warm: int) -> int:
+    """Return the number of lanes whose pressure has a factor of temperature or first cycles."""
+    return count_on(fixed[effects + PATH.first_loss], 0.0) + count_on(  # type: ignore[no-any-return]
+        fixed[warm + WARM.temperature_gain], 0.0
+    )
 
 
 @kernel
@@ -129,15 +180,18 @@ def path_factor(rows: Any, fixed: Any, j: int, state: int, effects: int, warm: i
 
 @kernel
 def path_step(
-    rows: Any, fixed: Any, state: int, effects: int, plain: int, warm: int, pressure: Any,
-    set_point: Any, effective: Any, was: Any, step: Any, i: int, substeps: int, period: float,
+    rows: Any, fixed: Any, state: int, effects: int, delayed: int, plain: int, warm: int,
+    pressure: Any, set_point: Any, effective: Any, was: Any, step: Any, i: int, substeps: int,
+    period: float,
 ) -> None:  # fmt: skip
     """Advance pressures and effective pressures of one muscle of a tile through sub-step ``i``.
 
     ``was`` receives the effective pressures before it [Pa] (:func:`path_air`, :func:`path_muscle`).
     """
     own = scratch(2, LANES)
-    path_air(rows, fixed, state, effects, plain, pressure, set_point, step, i, substeps, period)
+    path_air(
+        rows, fixed, state, effects, delayed, plain, pressure, set_point, step, i, substeps, period
+    )
     path_muscle(rows, fixed, state, effects, warm, pressure, period / substeps, own[0], own[1])
     for j in range(LANES):
         was[j] = effective[j]
@@ -150,8 +204,6 @@ def begin_path(
 ) -> float:
     """Begin the path of one muscle at rest; return its effective pressure [Pa]."""
     begin_air(rows, j, state + PATH_STATE.air, pressure)
-    for k in range(N_HISTORY):
-        rows[state + PATH_STATE.commands + k][j] = pressure
     rows[state + PATH_STATE.travel][j] = 0.0
     crept = begin_creep(rows, fixed, j, state + PATH_STATE.creep, effects + PATH.creep_1, pressure)
     factor = path_factor(rows, fixed, j, state, effects, warm)

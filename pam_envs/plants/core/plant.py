@@ -25,7 +25,10 @@ from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
 from pam_envs.plants.core.passivity import ImposedMuscles
+from pam_envs.pneumatics.regulator import NO_SLEW_LIMIT
 from pam_envs.wording import near
+
+LAG_ALONE = {"regulator.dead_time": 0.0, "regulator.slew_rate": NO_SLEW_LIMIT}
 
 
 class UnstableParameters(ValueError):
@@ -215,6 +218,18 @@ class Plant:
         """Return a parameter by dotted name, in SI."""
         component, _, entry = name.partition(".")
         return float(getattr(getattr(self, component), entry))
+
+    def with_lag_alone(self) -> Self:
+        """Return the plant whose regulators have neither dead time nor rate limit.
+
+        The regulators of papers that identify a lag, and the linear part of any.
+        """
+        return self.replace({n: v for n, v in LAG_ALONE.items() if n in self.names})
+
+    @property
+    def dead_time(self) -> float:
+        """Dead time [s] from a setpoint to the pressure; 0 where the dynamics have none."""
+        return self.regulator.dead_time  # type: ignore[attr-defined, no-any-return]
 
     @property
     def extended(self) -> bool:

@@ -1,7 +1,7 @@
 """Readings of a plant's sensors, with their effects in an extended plant.
 
-The kernels of a plant call :func:`read_sensors` at the beginning (period 0) and at the end of each
-control period; :func:`effect_kernels` gives its replacement.
+The kernels of a plant call :func:`begin_sensors` at the beginning and :func:`read_sensors` at the
+end of each control period; :func:`effect_kernels` gives their replacements.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from pam_envs.kernels.build import kernel
+from pam_envs.kernels.build import LANES, kernel, scratch
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import turn_on_bearing
 from pam_envs.sensing.sensor import begin_sensor, sense
@@ -28,26 +28,37 @@ def full_scale(fixed: Any, k: int, j: int) -> float:
 
 
 @kernel
-def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write readings with the effects of the sensors: a plain plant has none."""
+def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the sensors of one lane: those of a plain plant have no effects."""
 
 
 @kernel
-def read_with_effects(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write the undisturbed readings of lane ``j``; those of period 0 begin the sensors.
+def read_sensors(rows: Any, fixed: Any, step: Any, period: float) -> None:
+    """Write readings with the effects of the sensors of a tile: a plain plant has none."""
 
-    The readings are rows from ``READINGS``, followed by a ring for each.
-    """
+
+@kernel
+def begin_with_effects(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the sensors of lane ``j``. The readings are rows from ``READINGS``, a ring for each."""
     for k in range(len(MEASURED)):
         ring = READINGS + len(MEASURED) + k * N_HISTORY
-        value, effects, full = rows[MEASURED[k]][j], SENSOR_EFFECTS[k], full_scale(fixed, k, j)
-        if step == 0:
-            begin_sensor(rows, fixed, j, READINGS + k, ring, effects, value, full)
-        else:
-            sense(
-                rows, fixed, j, READINGS + k, ring, effects, value, full, step, step * period,
-                period,
-            )  # fmt: skip
+        begin_sensor(
+            rows, fixed, j, READINGS + k, ring, SENSOR_EFFECTS[k], rows[MEASURED[k]][j],
+            full_scale(fixed, k, j),
+        )  # fmt: skip
+
+
+@kernel
+def read_with_effects(rows: Any, fixed: Any, step: Any, period: float) -> None:
+    """Write the undisturbed readings of a tile at the end of control period ``step``."""
+    full = scratch(1, LANES)
+    for k in range(len(MEASURED)):
+        for j in range(LANES):
+            full[0][j] = full_scale(fixed, k, j)
+        sense(
+            rows, fixed, READINGS + k, READINGS + len(MEASURED) + k * N_HISTORY, SENSOR_EFFECTS[k],
+            rows[MEASURED[k]], full[0], step, period,
+        )  # fmt: skip
 
 
 def sensor_rows(sensors: int) -> int:
@@ -71,6 +82,7 @@ def effect_kernels(
         "SENSOR_EFFECTS": tuple(effects),
         "FULL_SCALES": tuple(full_scales),
         "READINGS": sensors,
+        "begin_sensors": begin_with_effects,
         "read_sensors": read_with_effects,
         "EFFECTS_AT": first,
         "SENSED": tuple(range(sensors, sensors + len(measured))),

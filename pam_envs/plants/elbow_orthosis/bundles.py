@@ -15,7 +15,7 @@ from pam_envs.kernels.arithmetic import clip, sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.mechanics.pulley import contraction_of
 from pam_envs.muscle.quadratic_bundle import bundle_shape, bundle_volume, grown_volume
-from pam_envs.plants.core.muscle_path import regulated
+from pam_envs.plants.core.muscle_path import DELAYED, follow_set_point
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.pneumatics.on_off_pair import coil_window, emptied, filled
 
@@ -114,14 +114,16 @@ def exchange_regulated(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float, work: Any
 ) -> None:
     """Advance both pressures of a tile towards their setpoints."""
-    h = period / substeps
     for side in range(2):
-        pressure, command = rows[K.PRESSURE_A + side], rows[K.COMMAND_A + side]
+        pressure = rows[K.PRESSURE_A + side]
         was, now, gives = work[WAS_A + side], work[NOW_A + side], work[GIVES_A + side]
         for j in range(LANES):
-            was[j] = pressure[j]
-            now[j] = regulated(fixed, K.REGULATOR_MAX_PRESSURE, j, pressure[j], command[j], h)
+            was[j] = now[j] = pressure[j]
             gives[j] = 0.0
+        follow_set_point(
+            rows, fixed, K.DELAY + side * DELAYED.end, K.REGULATOR_MAX_PRESSURE, now,
+            rows[K.COMMAND_A + side], counts[K.STEP], i, substeps, period,
+        )  # fmt: skip
 
 
 @kernel

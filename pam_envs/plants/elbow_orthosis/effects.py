@@ -9,7 +9,14 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.plants.core.muscle_path import PATH_STATE, WARM, begin_path, path_air, path_muscle
+from pam_envs.plants.core.muscle_path import (
+    DELAYED,
+    PATH_STATE,
+    WARM,
+    begin_path,
+    path_air,
+    path_muscle,
+)
 from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.bundles import AIR, GIVES_A, NOW_A, WAS_A, count_used_air
@@ -62,8 +69,9 @@ def exchange_regulated(
     for side in range(2):
         pressure = rows[K.PRESSURE_A + side]
         path_air(
-            rows, fixed, path_of(side), K.EFFECT.path, K.REGULATOR_MAX_PRESSURE, pressure,
-            rows[K.COMMAND_A + side], counts[K.STEP], i, substeps, period,
+            rows, fixed, path_of(side), K.EFFECT.path, K.DELAY + side * DELAYED.end,
+            K.REGULATOR_MAX_PRESSURE, pressure, rows[K.COMMAND_A + side],
+            counts[K.STEP], i, substeps, period,
         )  # fmt: skip
         for j in range(LANES):
             work[NOW_A + side][j] = pressure[j]

@@ -80,6 +80,11 @@ class ElbowOrthosis(Plant, rows=K):
     angle: AngleSensor = field(default_factory=AngleSensor)
     pressure: GaugeSensor = field(default_factory=GaugeSensor)
 
+    @property
+    def dead_time(self) -> float:
+        """Dead time [s] from a setpoint to the pressure."""
+        return 0.0 if self.valves == "on_off" else self.regulator.dead_time
+
     def _usage(self) -> Usage:
         return Usage("an elbow", "virgin", reach=0.55 * self.pulley.stroke)
 
@@ -126,14 +131,18 @@ class ElbowOrthosis(Plant, rows=K):
 
     @classmethod
     def paper(
-        cls, hysteresis: str = "maxwell_slip", valves: Valves = "proportional", **changes: float
+        cls,
+        hysteresis: str = "maxwell_slip_length",
+        valves: Valves = "proportional",
+        **changes: float,
     ) -> ElbowOrthosis:
         """Return the orthosis with three and seven muscles on a pulley of 31.5 mm.
 
         Parameters
         ----------
-        hysteresis : {"maxwell_slip", "preisach", "none"}
-            Hysteresis model; the two models differ but have the same widest loop.
+        hysteresis : {"maxwell_slip_length", "preisach_length", "none"}
+            Kind of the hysteresis: driven by length as here, or ``"maxwell_slip"`` and
+            ``"preisach"``, driven by pressure. All have the same widest loop at one pressure.
         valves : {"proportional", "on_off"}
             See the class.
         **changes : float

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.parameters import named_rows
-from pam_envs.plants.core.muscle_path import PATH_STATE
+from pam_envs.plants.core.muscle_path import DELAYED, PATH_STATE
 from pam_envs.plants.core.rows import dotted, each, layout, path_effects
 from pam_envs.plants.core.sensors import sensor_rows
 
@@ -33,11 +33,12 @@ globals().update(
             "stiffness felt wearer slack air_a air_b used switches clock drive at_a at_b lag_a "
             "lag_b"
         )
-        | each("left lift opened", VALVES),
+        | each("left lift opened", VALVES)
+        | {"delay": 2 * DELAYED.end},
         dotted(
             bundle_a=_BUNDLE,
             bundle_b=_BUNDLE,
-            regulator="max_pressure time_constant slew_rate",
+            regulator="max_pressure dead_time time_constant slew_rate",
             valve="supply_pressure conductance critical_ratio opening_time closing_time frequency",
             hysteresis="loop",
             pulley="radius lowest highest stop_stiffness",

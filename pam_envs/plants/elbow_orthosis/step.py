@@ -18,7 +18,8 @@ from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.guide import turn
 from pam_envs.mechanics.pulley import stop_torque
-from pam_envs.plants.core.sensors import read_sensors
+from pam_envs.plants.core.muscle_path import DELAYED, begin_delay
+from pam_envs.plants.core.sensors import begin_sensors, read_sensors
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.bundles import (
     AIR,
@@ -218,7 +219,7 @@ def advance(
     slide(rows, fixed, counts, table, hysteresis, elements, 0, LANES)
     for j in range(LANES):
         report(rows, fixed, j)
-        read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
+    read_sensors(rows, fixed, counts[K.STEP], period)
 
 
 @kernel
@@ -312,7 +313,7 @@ def begin_lane(
     for side in range(2):
         rows[K.AIR_A + side][j] = air_at(rows, fixed, j, side)
     report(rows, fixed, j)
-    read_sensors(rows, fixed, j, 0, 0.0)
+    begin_sensors(rows, fixed, j)
 
 
 @kernel
@@ -322,6 +323,8 @@ def start_regulated(rows: Any, fixed: Any, j: int) -> None:
         rows[K.PRESSURE_A][j],
         rows[K.PRESSURE_A + 1][j],
     )
+    for side in range(2):
+        begin_delay(rows, j, K.DELAY + side * DELAYED.end, rows[K.PRESSURE_A + side][j])
 
 
 @kernel

@@ -29,7 +29,7 @@ def regulate_with_lag(
 ) -> None:
     """Advance the pressures of a tile behind the lag of the regulator, with all effects."""
     path_air(
-        rows, fixed, EFFECTS_AT + K.STATE.path, K.EFFECT.path, K.REGULATOR_MAX_PRESSURE,
+        rows, fixed, EFFECTS_AT + K.STATE.path, K.EFFECT.path, K.DELAY, K.REGULATOR_MAX_PRESSURE,
         rows[K.PRESSURE], rows[K.SET_POINT], counts[K.STEP], i, substeps, period,
     )  # fmt: skip
     advance_muscle(rows, fixed, period / substeps)

@@ -99,9 +99,10 @@ class KneeOrthosis(Plant, rows=K):
     mounting : {"rig", "no_load", "leg"}
         See the module.
     dynamics : {"lag", "measured"}
-        Between setpoint and pressure: the regulator's lag, with which the inverse alone tracks as
-        published, or the published frequency response ``G_T / G_T(0)``, for which the feedback was
-        designed. The paper's figures for the two exclude each other.
+        Between setpoint and pressure: the regulator's dead time, rate limit and lag, of which the
+        lag alone makes the inverse track as published, or the published frequency response
+        ``G_T / G_T(0)``, for which the feedback was designed. The paper's figures for the two
+        exclude each other.
     activity : {"walk", "stairs_up", "stairs_down"}
         Activity of the leg.
     regulator, hysteresis, muscle, lever, fixture, leg, stride, shoe, activation
@@ -132,6 +133,11 @@ class KneeOrthosis(Plant, rows=K):
     ground: GroundSensor = field(default_factory=GroundSensor)
     cop: CopSensor = field(default_factory=CopSensor)
     ankle: AngleSensor = field(default_factory=AngleSensor)
+
+    @property
+    def dead_time(self) -> float:
+        """Dead time [s] from a setpoint to the pressure."""
+        return 0.0 if self.dynamics == "measured" else self.regulator.dead_time
 
     def _usage(self) -> Usage:
         return Usage("the orthosis", "low", self.regulator.max_pressure, unit_slope=False)

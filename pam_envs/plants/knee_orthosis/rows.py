@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pam_envs.hysteresis.protocol import NUMBERS
-from pam_envs.plants.core.muscle_path import PATH_STATE
+from pam_envs.plants.core.muscle_path import DELAYED, PATH_STATE
 from pam_envs.plants.core.rows import dotted, each, layout, path_effects
 from pam_envs.plants.core.sensors import sensor_rows
 from pam_envs.pneumatics.measured_dynamics import MODE_ROWS, MODES
@@ -27,9 +27,9 @@ globals().update(
             "hold_rate quads quads_free flexors flexors_free at lag stick rub stride_number early "
             "next_early heavy next_heavy reflex felt felt_count felt_part"
         )
-        | {"mode": MODES, "expected": PARTS},
+        | {"mode": MODES, "expected": PARTS, "delay": DELAYED.end},
         dotted(
-            regulator="max_pressure time_constant slew_rate",
+            regulator="max_pressure dead_time time_constant slew_rate",
             hysteresis="width friction empty",
             muscle="shortest_length stiffness_ratio full_volume gain",
             lever="arm fittings stiffness relaxed_angle mount_angle inertia damping",

@@ -13,8 +13,8 @@ from typing import Any
 from pam_envs.hysteresis import protocol
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.plants.core.muscle_path import regulated
-from pam_envs.plants.core.sensors import read_sensors
+from pam_envs.plants.core.muscle_path import begin_delay, follow_set_point
+from pam_envs.plants.core.sensors import begin_sensors, read_sensors
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.effects import muscle_kernels
 from pam_envs.plants.knee_orthosis.motion import (
@@ -133,16 +133,17 @@ def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
 
 @kernel
 def lag(rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float) -> None:
-    """Advance the pressure behind a first-order lag."""
-    h = period / substeps
-    pressure, set_point = rows[K.PRESSURE], rows[K.SET_POINT]
-    for j in range(LANES):
-        pressure[j] = regulated(fixed, K.REGULATOR_MAX_PRESSURE, j, pressure[j], set_point[j], h)
+    """Advance the pressure behind dead time, rate limit and first-order lag."""
+    follow_set_point(
+        rows, fixed, K.DELAY, K.REGULATOR_MAX_PRESSURE, rows[K.PRESSURE], rows[K.SET_POINT],
+        counts[K.STEP], i, substeps, period,
+    )  # fmt: skip
 
 
 @kernel
 def settle_lag(rows: Any, fixed: Any, j: int) -> None:
-    """Put the lag of one lane at rest at its pressure."""
+    """Put the lag of one lane at rest at its pressure, which is also its setpoint."""
+    begin_delay(rows, j, K.DELAY, rows[K.PRESSURE][j])
 
 
 @kernel
@@ -195,7 +196,7 @@ def advance(
         slide(rows, fixed, counts, table, hysteresis, elements, 0.0, work)
     for j in range(LANES):
         report(rows, fixed, j, period)
-        read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
+    read_sensors(rows, fixed, counts[K.STEP], period)
 
 
 @routine
@@ -223,7 +224,7 @@ def begin_lane(
     rest(rows, fixed, counts, table, gait, hysteresis, elements, j)
     settle_friction(rows, fixed, counts, table, hysteresis, elements, j)
     report(rows, fixed, j, 0.0)
-    read_sensors(rows, fixed, j, 0, 0.0)
+    begin_sensors(rows, fixed, j)
     rows[K.OLD_AIR][j] = rows[K.AIR][j]
 
 

@@ -129,14 +129,15 @@ class RedundantManipulator(PairPlant, rows=M):
 
     @classmethod
     def paper(
-        cls, hysteresis: str = "maxwell_slip", chain: SerialChain = LINK, **changes: float
+        cls, hysteresis: str = "maxwell_slip_length", chain: SerialChain = LINK, **changes: float
     ) -> RedundantManipulator:
         """Return the arm whose muscles end at 25 % contraction, so that joints take +-30 degrees.
 
         Parameters
         ----------
-        hysteresis : {"maxwell_slip", "preisach", "none"}
-            Hysteresis model; both operators have the same loops.
+        hysteresis : {"maxwell_slip_length", "preisach_length", "none"}
+            Kind of the hysteresis: driven by length as here, or ``"maxwell_slip"`` and
+            ``"preisach"``, driven by pressure. All have the same loops at one pressure.
         chain : SerialChain
             Joints and links.
         **changes : float
@@ -147,7 +148,7 @@ class RedundantManipulator(PairPlant, rows=M):
 
     @classmethod
     def measured(
-        cls, hysteresis: str = "maxwell_slip", chain: SerialChain = LINK, **changes: float
+        cls, hysteresis: str = "maxwell_slip_length", chain: SerialChain = LINK, **changes: float
     ) -> RedundantManipulator:
         """Return the arm with muscles as measured, its joints limited to the angle that they reach.
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.plants.antagonistic_joint.rows import STAGE
-from pam_envs.plants.core.muscle_path import PATH_STATE
+from pam_envs.plants.core.muscle_path import DELAYED, PATH_STATE
 from pam_envs.plants.core.rows import dotted, each, layout, path_effects
 from pam_envs.plants.core.sensors import sensor_rows
 
@@ -28,7 +28,8 @@ globals().update(
             MOST_STAGES,
         )
         | each("pressure set_point force contraction lag at stick", 2 * MOST_STAGES)
-        | each("payload slack air straight share"),
+        | each("payload slack air straight share")
+        | {"delay": 2 * MOST_STAGES * DELAYED.end},
         (*STAGE, *dotted(arm="mass_factor damping_factor")),
         path_effects("muscle", sensors=("angle", "pressure")),
         {

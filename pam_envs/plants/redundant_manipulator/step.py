@@ -35,6 +35,7 @@ from pam_envs.mechanics.serial_chain.kernels import work_rows as chain_work_rows
 from pam_envs.plants.antagonistic_joint.effects import pair_kernels
 from pam_envs.plants.antagonistic_joint.pair import (
     PAIR,
+    begin_delays,
     begin_muscles,
     command,
     contract,
@@ -48,7 +49,7 @@ from pam_envs.plants.antagonistic_joint.pair import (
     stop_torque,
     turning,
 )
-from pam_envs.plants.core.sensors import read_sensors
+from pam_envs.plants.core.sensors import begin_sensors
 from pam_envs.plants.redundant_manipulator import rows as M
 
 CHAIN_WORK = 6 * M.MOST_STAGES
@@ -144,6 +145,7 @@ def begin_lane(
         rows[M.VELOCITY + k][j] = rows[M.MIDDLE_RATE + k][j] = 0.0
         rows[M.CHANGE + k][j] = weight_bound(rows, fixed, j, k)
         rows[M.ANGLE + k][j] = rows[M.COMMAND + k][j]
+    begin_delays(rows, j)
     begin_muscles(rows, fixed, j)
     for _ in range(RESTING):
         for k in range(N_STAGES):
@@ -157,7 +159,7 @@ def begin_lane(
         contract(rows, fixed, j, k, rows[M.ANGLE + k][j])
     lag_of(rows, fixed, counts, table, state, elements, 2 * N_STAGES, j, j + 1)
     report_state(rows, fixed, j)
-    read_sensors(rows, fixed, j, 0, 0.0)
+    begin_sensors(rows, fixed, j)
 
 
 @kernel

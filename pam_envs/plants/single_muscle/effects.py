@@ -28,7 +28,7 @@ from pam_envs.kernels.build import LANES, kernel, routine, scratch
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.guide import stick_slip_step
 from pam_envs.mechanics.hanging_mass import MOUNT_STATE, load_fraction, mount_step
-from pam_envs.muscle.effective_area import fine_slope, fine_tension, tension, tension_slope
+from pam_envs.muscle.effective_area import law_and_slope
 from pam_envs.muscle.effects import (
     slip_strands,
     stiffening,
@@ -37,7 +37,7 @@ from pam_envs.muscle.effects import (
     temperature_factor,
     viscous_damping,
 )
-from pam_envs.plants.core.sensors import effect_kernels, read_with_effects
+from pam_envs.plants.core.sensors import begin_with_effects, effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.rows import STATE as S
@@ -45,8 +45,9 @@ from pam_envs.pneumatics.regulator import (
     air_step,
     begin_air,
     delay_commands,
-    delayed_fraction,
+    late_shares,
     line_effects_on,
+    stage_widths,
     valve_effects_on,
 )
 
@@ -55,6 +56,7 @@ EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 plain_hysteresis: Any = None
 hysteresis_ahead: Any = None
 hysteresis_moved: Any = None
+STAGED = 1  # 0 where the hysteresis has no memory of pressures within a sub-step
 
 FULL_STRAIN = 0.15
 """Full scale of the position sensor, over the rest length."""
@@ -153,16 +155,21 @@ def law_of(
 
     Then minus its derivative by the contraction [N], at another one.
     """
-    area, taper = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j]
-    force, k1 = fixed[R.MUSCLE_BRAID_FORCE][j] * stiffer, fixed[R.MUSCLE_STIFFNESS][j] * stiffer
-    k3, curve = fixed[R.MUSCLE_HARDENING][j] * stiffer, fixed[R.MUSCLE_AREA_CURVE][j]
-    k2, k4 = fixed[R.MUSCLE_SOFTENING][j] * stiffer, fixed[R.MUSCLE_STIFFENING][j] * stiffer
-    strain = fixed[R.MUSCLE_BRAID_STRAIN][j]
-    bend = decay(e / strain)
-    pull = tension(drive, e, bend, area, taper, force, k1, k3)
-    slope = tension_slope(middle, e, bend, area, taper, force / strain, k1, k3)
-    pull = pull + fine_tension(drive, e, area, curve, k2, k4)
-    return pull, slope + fine_slope(middle, e, area, curve, k2, k4)
+    return law_and_slope(
+        drive,
+        middle,
+        e,
+        stiffer,
+        fixed[R.MUSCLE_AREA][j],
+        fixed[R.MUSCLE_AREA_TAPER][j],
+        fixed[R.MUSCLE_BRAID_FORCE][j],
+        fixed[R.MUSCLE_BRAID_STRAIN][j],
+        fixed[R.MUSCLE_STIFFNESS][j],
+        fixed[R.MUSCLE_HARDENING][j],
+        fixed[R.MUSCLE_AREA_CURVE][j],
+        fixed[R.MUSCLE_SOFTENING][j],
+        fixed[R.MUSCLE_STIFFENING][j],
+    )
 
 
 @routine
@@ -226,7 +233,7 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     rows[EFFECTS_AT + S.hangs][j] = balance(fixed, j, 0.0, rows[R.LOAD][j], NO_SUPPORT)
     position = x * (1.0 + crept) - rows[R.REST][j]
     rows[EFFECTS_AT + S.position][j] = position
-    read_with_effects(rows, fixed, j, 0, 0.0)
+    begin_with_effects(rows, fixed, j)
 
 
 @kernel
@@ -392,15 +399,11 @@ def advance_extended(
         older, newer, switch,
     )  # fmt: skip
     for i in range(substeps):
+        late_shares(switch, i, substeps, period, late)
         for j in range(LANES):
-            late[j] = delayed_fraction((i + 1) * h, substeps / period, switch[j])
             was[j] = drive[j]
         for stage in range(2):  # towards the older setpoint, then towards the newer one
-            busy = 0
-            for j in range(LANES):
-                width[j] = h * (late[j] if stage == 1 else 1.0 - late[j])
-                busy = busy + (1 if width[j] > 0.0 else 0)
-            if busy == 0:
+            if stage_widths(late, stage, h, width) == 0:
                 continue
             air_step(
                 rows, fixed, EFFECTS_AT + S.air, R.EFFECT.regulator, rows[R.PRESSURE],
@@ -410,6 +413,14 @@ def advance_extended(
             )  # fmt: skip
             for j in range(LANES):
                 rows[EFFECTS_AT + S.travel][j] += abs(rows[R.PRESSURE][j] - own[1][j])
+            if STAGED > 0:
+                effective_pressure(
+                    rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, width, own,
+                    creeps, worn,
+                )  # fmt: skip
+        if STAGED == 0:
+            for j in range(LANES):
+                width[j] = h
             effective_pressure(
                 rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, width, own,
                 creeps, worn,
@@ -426,8 +437,7 @@ def advance_extended(
             )  # fmt: skip
             for j in range(LANES):
                 was[j] = drive[j]
-    for j in range(LANES):
-        read_with_effects(rows, fixed, j, counts[R.STEP][j] + 1, period)
+    read_with_effects(rows, fixed, counts[R.STEP], period)
 
 
 def replacements(kind: str, first: int) -> dict[str, Any]:

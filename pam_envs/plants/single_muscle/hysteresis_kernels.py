@@ -142,6 +142,7 @@ def hysteresis_kernels(kind: str, name: str = "write_drive") -> dict[str, Any]:
     plain = model.identity or by_length
     return protocol.kernels(kind) | {
         name: pressure_itself if plain else effective_pressure,
+        "STAGED": 0 if plain else 1,
         "hysteresis_ahead": peek_friction if by_length else no_friction,
         "hysteresis_moved": move_friction if by_length else no_friction,
         "start_friction": begin_friction if by_length else begin_without,

@@ -1,8 +1,9 @@
 """A muscle that lifts a load: Festo MAS-10-N-100 of positioning2021.
 
-    setpoint -> regulator -> pressure -> hysteresis -> effective pressure -> static law -> hanging
-    mass
+    setpoint -> regulator -> pressure -> static law and friction -> hanging mass
 
+The length drives the friction; in the papers' form a hysteresis of the pressure, before the static
+law, takes its place.
 The measured quantity is the contraction from the rest length under the load that hangs at the
 start, as in the paper's tables. Effects (off unless set) of all components; the parameters with a
 neutral value in ``SingleMuscle.neutral`` switch them on.
@@ -10,7 +11,6 @@ neutral value in ``SingleMuscle.neutral`` switch them on.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -27,7 +27,7 @@ from pam_envs.muscle.effective_area import EffectiveAreaMuscle
 from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.friction import LoadedFriction
+from pam_envs.plants.single_muscle.friction import LoadedFriction, strains_of_rest
 from pam_envs.plants.single_muscle.hysteresis import Hysteresis, HysteresisInverse
 from pam_envs.pneumatics.regulator import Regulator
 from pam_envs.sensing.sensor import PositionSensor, PressureSensor
@@ -85,14 +85,15 @@ class SingleMuscle(Plant, rows=R):
         )
 
     @classmethod
-    def mas10(cls, hysteresis: str = "maxwell_slip", **changes: float) -> SingleMuscle:
+    def mas10(cls, hysteresis: str = "maxwell_slip_length", **changes: float) -> SingleMuscle:
         """Return the muscle identified on the measured tables, with that hysteresis.
 
         Parameters
         ----------
-        hysteresis : {"maxwell_slip", "preisach", "none"}
-            Hysteresis model; each was identified on the same data. Driven by length, and so
-            passive: ``"maxwell_slip_length"`` and ``"preisach_length"``.
+        hysteresis : {"maxwell_slip_length", "preisach_length", "none"}
+            Kind of the hysteresis: driven by length as here, and so passive, or
+            ``"maxwell_slip"`` and ``"preisach"``, driven by pressure. Each was identified on the
+            same data.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``mass__load=4.55``).
         """
@@ -117,14 +118,9 @@ class SingleMuscle(Plant, rows=R):
         return np.asarray(self._absolute(drive, load) - self._absolute(np.zeros_like(drive), load))
 
     def _absolute(self, drive: NDArray[Any], load: NDArray[Any]) -> NDArray[np.float64]:
-        low, high = np.full(drive.shape, -0.3), np.full(drive.shape, 0.6)
         weight, stiffer, shift = self._carried(load)
-        for _ in range(56):
-            e = 0.5 * (low + high)
-            pull = self.muscle.tension(drive - shift, e) - (stiffer - 1.0) * self.muscle.passive(e)
-            up = pull > weight
-            low, high = np.where(up, e, low), np.where(up, high, e)
-        return np.asarray(0.5 * (low + high) * self.muscle.rest_length)
+        strain = strains_of_rest(self.muscle, drive - shift, weight, stiffer)
+        return strain * self.muscle.rest_length
 
     def _carried(self, load: NDArray[Any]) -> tuple[Any, Any, Any]:
         """Return the weight [N], the factor on the stiffness and the pressure shift [Pa]."""
@@ -191,7 +187,5 @@ class SingleMuscle(Plant, rows=R):
     # --- rows, files, identity ----------------------------------------------------------------
 
     def table_values(self) -> list[float]:
-        """Return area and cosine of the braid, and the numbers of the hysteresis operator."""
-        angle = self.muscle.braid_angle
-        tall = math.pi * self.muscle.diameter**2 / 4.0 / math.sin(angle) ** 2
-        return [tall, math.cos(angle), *self._model.numbers(self.regulator.max_pressure)]
+        """Return the numbers of the hysteresis operator."""
+        return self._model.numbers(self.regulator.max_pressure)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.kernels.history import N_HISTORY
+from pam_envs.kernels.history import fill_ring
 from pam_envs.kernels.motion import oscillator_wide
 from pam_envs.plants.core.rollout import Loop, drives_of, first_of, loop_for, plants_of, run
 from pam_envs.plants.single_muscle import rows as R
@@ -92,8 +92,7 @@ def begin_extended(
     for j in range(LANES):
         slide_to_rest(rows, fixed, counts, table, R.END, elements, j)
         begin_effects(rows, fixed, j)
-        for k in range(N_HISTORY):
-            rows[R.HISTORY + k][j] = drives[HELD][t][min(first + j, last)]
+        fill_ring(rows, R.HISTORY, j, drives[HELD][t][min(first + j, last)])
 
 
 @kernel

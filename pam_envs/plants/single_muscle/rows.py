@@ -1,8 +1,7 @@
 """Row numbers of the single muscle (see :mod:`pam_envs.plants.core.rows`).
 
 ``REST`` to ``CHANGE`` are drawn at reset; ``STRAIN`` to ``STICK`` belong to friction driven by
-length; ``HISTORY`` is the ring of the last setpoints; ``TALL`` and ``COSINE`` are derived from the
-muscle's diameter and braid angle.
+length; ``HISTORY`` is the ring of the last setpoints.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from pam_envs.hysteresis.friction_effects import (
     FrictionEffects,
     Threshold,
 )
-from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import GuideEffects
 from pam_envs.mechanics.hanging_mass import MOUNT_STATE, MountEffects, SupportEffects
@@ -77,7 +75,6 @@ _ROWS = layout(
         **each("kelvin hung hangs position"),
         "sensors": sensor_rows(2),
     },
-    {"tall": 1, "cosine": 1, "model": NUMBERS},
 )
 globals().update(_ROWS)
 

@@ -15,11 +15,10 @@ from typing import Any
 from pam_envs.constants import GRAVITY
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.kernels.history import N_HISTORY
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.muscle.effective_area import tension, tension_slope
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regulator_step
+from pam_envs.pneumatics.regulator import delay_commands, late_shares, regulator_step, stage_widths
 
 # placeholders, see hysteresis_kernels
 write_drive: Any = None
@@ -62,19 +61,13 @@ def advance(
         fixed[R.MUSCLE_STIFFNESS],
         fixed[R.MUSCLE_HARDENING],
     )
-    braid_strain, set_point, step = fixed[R.MUSCLE_BRAID_STRAIN], rows[R.SET_POINT], counts[R.STEP]
-    rub = fixed[R.HYSTERESIS_FRICTION]
+    braid_strain, rub = fixed[R.MUSCLE_BRAID_STRAIN], fixed[R.HYSTERESIS_FRICTION]
     older, newer, switch, was, damped = work[3], work[4], work[5], work[6], work[7]
     per_lag, per_slew, per_mass, per_length = work[8], work[9], work[10], work[11]
     per_strain, per_jerk, drag, late, width = work[12], work[13], work[14], work[15], work[16]
-    for j in range(LANES):
-        age = dead[j] / period
-        whole = min(int(age), DELAY_PERIODS)
-        switch[j] = (age - whole) * period
-        now = step[j]
-        rows[R.HISTORY + (now & (N_HISTORY - 1))][j] = set_point[j]
-        newer[j] = rows[R.HISTORY + ((now + N_HISTORY - whole) & (N_HISTORY - 1))][j]
-        older[j] = rows[R.HISTORY + ((now + N_HISTORY - whole - 1) & (N_HISTORY - 1))][j]
+    delay_commands(
+        rows, R.HISTORY, rows[R.SET_POINT], dead, counts[R.STEP], period, older, newer, switch
+    )
     for j in range(LANES):
         per_lag[j] = 1.0 / lag[j]
         per_slew[j] = 1.0 / slew[j]
@@ -85,15 +78,11 @@ def advance(
         drag[j] = damping[j] * per_mass[j]
         damped[j] = decay(0.5 * drag[j] * h)
     for i in range(substeps):
+        late_shares(switch, i, substeps, period, late)
         for j in range(LANES):
-            late[j] = delayed_fraction((i + 1) * h, substeps / period, switch[j])
             was[j] = drive[j]
         for stage in range(2):  # towards the older setpoint, then towards the newer one
-            busy = 0
-            for j in range(LANES):
-                width[j] = h * (late[j] if stage == 1 else 1.0 - late[j])
-                busy = busy + (1 if width[j] > 0.0 else 0)
-            if busy == 0:
+            if stage_widths(late, stage, h, width) == 0:
                 continue
             for j in range(LANES):
                 target = newer[j] if stage == 1 else older[j]
