@@ -53,26 +53,44 @@ def test_local_links_resolve(page):
 ENVIRONMENT = re.compile(r"^\| `(?:PAM/)?(\w+?)(?:-v\d+)?` \|", re.MULTILINE)
 
 
-def nominal_rows(page: Path) -> dict[str, list[str]]:
-    """Return the cells of the first table of environments on a page, by environment."""
+def nominal_rows(page: Path) -> dict[str, list[tuple[str, str]]]:
+    """Return headings and cells of the first tables of environments on a page, by environment."""
     text = page.read_text().partition("## Rank changes")[0].partition("## Nominal tracks")[2]
     text = text or page.read_text().rpartition("Learned controllers against")[2]
-    lines = [line for line in text.splitlines() if ENVIRONMENT.match(line)]
-    cells = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
-    return {ENVIRONMENT.match(line)[1]: row for line, row in zip(lines, cells, strict=True)}
+    found: dict[str, list[tuple[str, str]]] = {}
+    heading: list[str] = []
+    for line in text.splitlines():
+        cells = [cell.strip(" |") for cell in line.split(" | ")]
+        if line.startswith("| environment |"):
+            heading = cells
+        elif environment := ENVIRONMENT.match(line):
+            row = list(zip(heading, cells, strict=True))
+            found[environment[1]] = found.get(environment[1], []) + row
+    return found
 
 
 def test_readme_table_equals_the_board():
     board = nominal_rows(ROOT / "benchmarks/LEADERBOARD.md")
     shown = nominal_rows(ROOT / "README.md")
     assert shown.keys() == board.keys() != set()
-    for env, (_, paper, error, _, learned, lower, wins, verdict) in shown.items():
-        said = board[env]
-        assert [paper, error] == said[1].split("<br>")
-        assert learned == said[2].split("<br>")[1]
-        assert wins == said[4]
-        assert verdict.strip(" |") == said[5].strip(" |*").replace(" to be better", "")
+    for env, columns in shown.items():
+        said = dict(board[env])
+        _, paper, error, effort, _, learned, spent, lower, wins, verdict = (c for _, c in columns)
+        assert paper == said["best paper controller<br>best learned"].split("<br>")[0]
+        assert [error, learned] == said["RMS"].split("<br>")
+        assert [effort, spent] == said.get("EMG effort", "-<br>-").split("<br>")
+        assert wins == said["P"]
+        assert verdict == said["verdict"].strip("*").replace(" to be better", "")
         if learned == "-":
-            assert lower == said[3] == "-"
+            assert lower == said["lower by"] == "-"
             continue
-        assert float(lower.removesuffix(" %")) == round(float(said[3].split(" %")[0]))
+        assert float(lower.removesuffix(" %")) == round(float(said["lower by"].split(" %")[0]))
+
+
+def test_gaits_have_the_effort_beside_the_error():
+    board = nominal_rows(ROOT / "benchmarks/LEADERBOARD.md")
+    headings = {env: [title for title, _ in row] for env, row in board.items()}
+    gaits = {env for env, titles in headings.items() if "EMG effort" in titles}
+    assert gaits == {"KneeWalk", "KneeStairsUp", "KneeStairsDown"}
+    assert all(titles[2] == "RMS" for titles in headings.values())
+    assert all(headings[env][3] == "EMG effort" for env in gaits)

@@ -1,8 +1,5 @@
 """Briefly trained models for the tests of learning, which are skipped without torch."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -14,7 +11,7 @@ collect_ignore_glob = [] if all(map(find_spec, NEEDED)) else ["test_*.py"]
 
 
 @pytest.fixture(scope="session")
-def short_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[Any, Path]]:
+def short_run(tmp_path_factory):
     """Return what gives a model of a kind after a moment of training, and its folder."""
     from short_runs import kind, trained
 
@@ -30,13 +27,13 @@ def short_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple
 
 
 @pytest.fixture(scope="session")
-def ppo(short_run: Callable[[str], tuple[Any, Path]]) -> tuple[Any, Path]:
+def ppo(short_run):
     """Return the preset's network after a moment of training, and its folder."""
     return short_run("ppo")
 
 
 @pytest.fixture(scope="session")
-def normalized_ppo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]:
+def normalized_ppo(tmp_path_factory):
     """Return a plain network with a normalised observation, and its folder."""
     from short_runs import tiny, trained
 
@@ -47,6 +44,6 @@ def normalized_ppo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]
 
 
 @pytest.fixture(scope="session")
-def sac(short_run: Callable[[str], tuple[Any, Path]]) -> tuple[Any, Path]:
+def sac(short_run):
     """Return SAC after a moment of training, and its folder."""
     return short_run("sac")

@@ -1,15 +1,17 @@
 """Tiny settings, and training with them."""
 
-from __future__ import annotations
-
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import pytest
 import torch
+import yaml
 from rich.console import Console
 
+from agents.policies.policy_file import CARD
 from agents.settings import presets as configs
 from agents.training import train
 from agents.training.record import Run
@@ -19,50 +21,8 @@ QUIET = Console(quiet=True)
 ID = "PAM/MusclePositioning-v0"
 SHORT = {"episode_seconds": 0.3, "reference": "mixed", "load": None}
 LOOK = {"interval": 512, "episodes": 4, "settle_seconds": 0.1}
-MIXED = {"hysteresis": ["maxwell_slip", "preisach"], "randomize": True}
-PAST = {"frames": 3, "signals": ["contraction", "pressure"]}
 NARROW = {"hidden": [16], "activation": "tanh"}
-
-KINDS: dict[str, tuple[str, dict[str, Any]]] = {
-    "ppo": ("ppo", {}),
-    "sac": ("sac", {}),
-    "tqc": ("tqc", {"network": NARROW}),
-    "recurrent": ("recurrent_ppo", {"normalize": {"observation": False}}),
-    "plain_recurrent": (
-        "recurrent_ppo",
-        {"network": {"hidden": [16], "log_std_init": -0.5}, "normalize": {"observation": True}},
-    ),
-    "history": ("ppo", {"network": NARROW, "history": PAST, "evaluation": LOOK}),
-    "residual": (
-        "ppo",
-        {
-            "network": {"hidden": [16], "linear": True},
-            "residual": {"controller": "inverse_pid", "scale": 0.3},
-            "plants": MIXED,
-            "ppo": {"warm_up": 5},
-        },
-    ),
-    "residual_sac": (
-        "sac",
-        {
-            "network": NARROW,
-            "residual": {"controller": "pid"},
-            "history": PAST,
-            "normalize": {"observation": False, "reward": True},
-        },
-    ),
-    "residual_recurrent": (
-        "recurrent_ppo",
-        {
-            "network": {"hidden": [16], "linear": True},
-            "residual": {"controller": "inverse"},
-            "history": PAST,
-            "normalize": {"observation": True, "reward": True},
-            "recurrent_ppo": {"warm_up": 5},
-        },
-    ),
-}
-"""One of each kind of policy: algorithm, and what differs from its preset."""
+KINDS = yaml.safe_load(Path(__file__).with_name("kinds.yaml").read_text(encoding="utf-8"))
 
 
 def tiny(algo: str = "ppo", **changes: Any) -> configs.Config:
@@ -83,8 +43,16 @@ def tiny(algo: str = "ppo", **changes: Any) -> configs.Config:
 
 def kind(name: str, **changes: Any) -> configs.Config:
     """Return tiny settings of a kind of policy."""
-    algo, own = KINDS[name]
-    return tiny(algo, **{**own, **changes})
+    return tiny(**{**KINDS[name], **changes})
+
+
+def with_card(source: Path, **changes: Any) -> bytes:
+    """Return a policy file with entries of its card changed."""
+    model = onnx.load_model(source)
+    card = {entry.key: entry.value for entry in model.metadata_props}[CARD]
+    del model.metadata_props[:]
+    model.metadata_props.add(key=CARD, value=json.dumps({**json.loads(card), **changes}))
+    return bytes(model.SerializeToString())
 
 
 def trained(folder: Path, config: configs.Config, seed: int = 3) -> Any:
@@ -109,7 +77,7 @@ def killed_after(run: Run, steps: int) -> None:
             raise Killed
         return ordinary(*arguments, **keywords)
 
-    model.collect_rollouts = collect  # type: ignore[method-assign]
+    model.collect_rollouts = collect
     with pytest.raises(Killed):
         train.train(run, model, QUIET)
     np.random.seed(999)  # noqa: NPY002  (a new process starts with other random numbers)

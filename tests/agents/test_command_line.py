@@ -1,9 +1,5 @@
 """Command line: environment ids and errors."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from agents.__main__ import main
@@ -13,16 +9,12 @@ NO_SUCH = ["--algo", "ppo", "--variant", "nosuch"]
 
 @pytest.mark.parametrize("given", ["KneeWalk-v0", "PAM/KneeWalk-v0"])
 @pytest.mark.parametrize("command", ["train", "sweep", "tune", "classical"])
-def test_namespace_of_an_id_is_optional(
-    command: str, given: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_namespace_of_an_id_is_optional(command, given, capsys):
     assert main([command, given, *NO_SUCH]) == 2
     assert "no ppo-nosuch preset for 'PAM/KneeWalk-v0'" in capsys.readouterr().err
 
 
-def test_sweep_of_a_short_id_uses_the_full_id(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_sweep_of_a_short_id_uses_the_full_id(tmp_path, capsys):
     assert main(["sweep", "KneeWalk-v0", "--seeds", "2", "--dry-run", "--out", str(tmp_path)]) == 0
     folder = tmp_path.resolve() / "PAM-KneeWalk-v0"
     assert capsys.readouterr().out.split() == [
@@ -43,13 +35,7 @@ def test_sweep_of_a_short_id_uses_the_full_id(
         (["evaluations"], "name policies"),
     ],
 )
-def test_errors_are_one_sentence_and_leave_no_files(
-    arguments: list[str],
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_errors_are_one_sentence_and_leave_no_files(arguments, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     assert main(arguments) == 2

@@ -1,8 +1,5 @@
 """Plants, environments and rollouts for the controllers' tests."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
@@ -78,14 +75,14 @@ def observations_of(env: Any, steps: int = 40, rows: int = 4) -> np.ndarray:
 
 
 @pytest.fixture
-def staircase() -> np.ndarray:
+def staircase():
     """Held levels [m], up, part of the way down, up again and down: inner loops included."""
     levels = [2, 4, 7, 10, 12, 9, 11, 6, 8, 7, 3, 5, 4]
     return np.repeat(np.array(levels) * 1e-3, HOLD)
 
 
 @pytest.fixture
-def settled() -> Callable[[dict[str, np.ndarray]], np.ndarray]:
+def settled():
     """Errors [m] late on each level of the staircase, before a preview shows the next one."""
 
     def errors(record: dict[str, np.ndarray]) -> np.ndarray:

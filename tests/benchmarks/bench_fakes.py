@@ -1,7 +1,5 @@
 """Controllers for the harness's own tests, built like those of the catalogue."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

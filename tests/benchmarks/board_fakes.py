@@ -1,44 +1,20 @@
 """Hand-made rows with known scores, in the format of real rows."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from benchmarks.runs import rows, traces
+from benchmarks.scoring.metrics import of_track
 
-CONTENT: dict[str, Any] = {
-    "schema": 1,
-    "name": "short_nominal",
-    "version": 1,
-    "title": "A short track",
-    "env": "PAM/MusclePositioning-v0",
-    "seeds": 3,
-    "settle_seconds": 0.5,
-    "hold_seconds": 0.3,
-    "sensed": "sensor/contraction",
-    "rests": ["steps"],
-    "cost_scales": {"cost/contraction": 0.001, "cost/pressure": 1.0e5},
-    "worst_case": {
-        "rms_error": 0.025,
-        "p95_error": 0.025,
-        "max_error": 0.025,
-        "steady_state_error": 0.025,
-        "sensed_rms_error": 0.025,
-        "pressure_travel": 1.2e6,
-        "air_use": 5.0e-5,
-        "constraint_cost": 10.0,
-    },
-    "kwargs": {"episode_seconds": 2.0},
-    "grid": {"reference": ["steps", "sines"]},
-}
+FIXED: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("board.yaml").read_text("utf-8"))
+CONTENT, ROUND = FIXED["track"], FIXED["round"]
 SIMC = "S. Skogestad, Simple analytic rules for model reduction and PID controller tuning"
 SCENARIOS = ("steps", "sines")
-ENTRANTS = ("inverse", "pid", "zero", "ppo", "young")
-"""Of the audit round."""
 
 
 def errors(middle: float, seeds: int = 3, spread: float = 0.01) -> np.ndarray[Any, Any]:
@@ -87,49 +63,22 @@ def row(
     episodes = of_split("public", public, scores, failed)
     if audit is not None:
         episodes += of_split("audit", audit, {**scores, **(unseen or {})}, failed_unseen)
-    content = copy.deepcopy(CONTENT) | {"name": track}
-    return {
+    made = copy.deepcopy(FIXED["row"])
+    made |= {
         "schema": rows.SCHEMA,
         "row": f"{track}--{name}",
-        "env": {"id": "PAM/MusclePositioning-v0", "version": 0},
         "task": f"task of {track}",
-        "controller": {
-            "name": name,
-            "kind": kind,
-            "knowledge": knowledge,
-            "summary": f"what {name} is",
-            "author": "",
-            "citation": citation,
-            "preview_seconds": 0.0,
-            "tuning": {"trials": 0, "how": "by rule"}
-            if kind == "classical"
-            else {"trials": 40, "how": "search of 40"},
-            "artefact": {"digest": "a" * 64, "files": []},
-            "training": None if kind == "classical" else [training(seed) for seed in seeds],
-        },
-        "scenarios": {"name": track, "version": 1, "digest": "d" * 64, "content": content},
-        "plants": dict.fromkeys(SCENARIOS, "p"),
-        "seeds": {scenario: list(_seeds("public", scenario)) for scenario in SCENARIOS},
-        "made_with": {"packages": {"numpy": "2"}, "sources": {}, "commit": "c" * 40},
         "episodes": episodes,
-        "audit": None if audit is None else copy.deepcopy(ROUND),
-        "traces": [trace(name)],
-        "volatile": {
-            "predict_us": {"median": 12.0, "p99": 30.0},
-            "machine": "m",
-            "date": "2026-01-01",
-        },
-        "checksum": "e" * 64,
     }
-
-
-ROUND: dict[str, Any] = {
-    "round": 2,
-    "salt": "5a17",
-    "drawn": "2026-01-02",
-    "entry": 1,
-    "entrants": dict.fromkeys(ENTRANTS, "a" * 64),
-}
+    made |= {"audit": None if audit is None else copy.deepcopy(ROUND), "traces": [trace(name)]}
+    made["controller"] |= {"name": name, "kind": kind, "knowledge": knowledge}
+    made["controller"] |= {"summary": f"what {name} is", "citation": citation}
+    if kind != "classical":
+        made["controller"]["tuning"] = {"trials": 40, "how": "search of 40"}
+        made["controller"]["training"] = [training(seed) for seed in seeds]
+    made["scenarios"] |= {"name": track, "content": copy.deepcopy(CONTENT) | {"name": track}}
+    made["seeds"] = {scenario: list(_seeds("public", scenario)) for scenario in SCENARIOS}
+    return made
 
 
 def _seeds(split: str, scenario: str, number: int = 3) -> range:
@@ -202,3 +151,24 @@ def board() -> list[dict[str, Any]]:
     for made in second:
         del made["audit"]["entrants"]["young"]
     return first + second
+
+
+def gait() -> list[dict[str, Any]]:
+    """Return rows of a gait: a paper controller, and a learned one with less error and effort."""
+    names = of_track({"metrics": ["range", "gait"]}).keys() - CONTENT["worst_case"].keys()
+    others: dict[str, Any] = dict.fromkeys(names, 0.5)
+    others |= {"track": "walk_nominal", "air_use": 3e-5}
+    learned = [1.5e-3] * 5
+    made = [
+        row("pid", 2e-3, audit=2e-3, **others),
+        row("ppo", learned, audit=learned, kind="learned", **others),
+    ]
+    for each, effort in zip(made, (0.96, 0.92), strict=True):
+        each["env"] = {"id": "PAM/KneeWalk-v0", "version": 0}
+        content = each["scenarios"]["content"]
+        content |= {"metrics": ["range", "gait"], "activity": "walk"}
+        content["worst_case"] |= dict.fromkeys(names, 2.0)
+        for episode in each["episodes"]:
+            number = episode["seed"] % 100 - 2  # -1, 0 and 1 in each scenario
+            episode["scores"]["emg_effort"] = effort + 0.01 * number
+    return made

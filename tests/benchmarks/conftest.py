@@ -1,10 +1,5 @@
 """A short track and the fake controllers."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from pathlib import Path
-
 import board_fakes
 import pytest
 import yaml
@@ -20,7 +15,7 @@ CONTENT = board_fakes.CONTENT | {
 
 
 @pytest.fixture(autouse=True)
-def anew() -> Iterator[None]:
+def anew():
     """Clear the identities of tracks and controllers: tests change what they are built from."""
     tasks.of.cache_clear()
     artefacts._answers.cache_clear()
@@ -28,7 +23,7 @@ def anew() -> Iterator[None]:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """The only scenario file is ``short``, and the only controllers are the fake ones."""
     (tmp_path / "short.yaml").write_text(yaml.safe_dump(CONTENT))
     monkeypatch.setattr(controllers, "SOURCES", ("bench_fakes",))
@@ -38,6 +33,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def track(folder: Path) -> scenarios.ScenarioSet:
+def track(folder):
     """The short track."""
     return scenarios.load(folder / "short.yaml")

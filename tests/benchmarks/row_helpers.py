@@ -1,7 +1,5 @@
 """Rows of a tiny track for tests: a classical controller, and a trained one with its audit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Statistics of the diagnosis benchmark and their bounds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from diagnosis_fakes import counted, failed, loop, record, sample
@@ -14,19 +12,19 @@ from benchmarks.diagnosis.report import figures, page
 
 
 @pytest.mark.parametrize(("count", "n"), [(0, 300), (1, 1500), (49, 50), (50, 50), (7, 12), (0, 1)])
-def test_bounds_equal_exact_binomial_test(count: int, n: int) -> None:
+def test_bounds_equal_exact_binomial_test(count, n):
     both = stats.binomtest(count, n).proportion_ci(0.95, "exact")
     assert exact_interval(count, n) == pytest.approx([both.low, both.high])
     one = stats.binomtest(count, n, alternative="less").proportion_ci(0.95, "exact")
     assert upper_bound(count, n) == pytest.approx(one.high)
 
 
-def test_300_clean_rigs_without_alarm_bound_it_at_one_percent() -> None:
+def test_300_clean_rigs_without_alarm_bound_it_at_one_percent():
     assert upper_bound(0, 300) < 0.01 < upper_bound(0, 290)
     assert upper_bound(1, 300) > 0.01
 
 
-def test_share_of_no_cases_is_none() -> None:
+def test_share_of_no_cases_is_none():
     assert share([]) == {"count": 0, "n": 0, "value": None, "interval": None, "upper": None}
     assert share([True, False, True, True])["value"] == 0.75
 
@@ -52,14 +50,12 @@ WORDS = ("right_first", "exact", "both", "wrong", "extra", "listed", "alarm")
         ("insufficient", [], [], set()),
     ],
 )
-def test_outcome_of_a_single_effect(
-    verdict: str, names: list[str], others: list[str], holds: set[str]
-) -> None:
+def test_outcome_of_a_single_effect(verdict, names, others, holds):
     found = Answer.of(record(verdict=verdict, names=names, others=others))
     assert {word for word in WORDS if getattr(found, word)} == holds
 
 
-def test_outcome_of_two_effects() -> None:
+def test_outcome_of_two_effects():
     truth = {"creep": 2.0, "leak": 1.0}
     one = Answer.of(record("pair", truth, "named", ["leak"]))
     assert one.right_first and not (one.exact or one.both or one.wrong or one.extra)
@@ -69,7 +65,7 @@ def test_outcome_of_two_effects() -> None:
     assert third.wrong and third.extra and not third.both
 
 
-def test_failed_run_counts_as_wrong() -> None:
+def test_failed_run_counts_as_wrong():
     made = figures(
         [
             failed(),
@@ -99,7 +95,7 @@ def test_failed_run_counts_as_wrong() -> None:
 # --- counts --------------------------------------------------------------------------------------
 
 
-def test_counts_of_a_sample_are_complete() -> None:
+def test_counts_of_a_sample_are_complete():
     made = figures(sample())
     expected = {
         "right_first": (3, 5),
@@ -133,7 +129,7 @@ def test_counts_of_a_sample_are_complete() -> None:
     assert made["rule_versions"] == ["7"]
 
 
-def test_verdicts_and_confusions_of_a_sample() -> None:
+def test_verdicts_and_confusions_of_a_sample():
     made = figures(sample())
     assert made["verdicts"]["creep"]["0.1-0.3"] == {"adequate": 1}
     assert made["verdicts"]["creep"]["1-2"] == {"named": 1}
@@ -152,7 +148,7 @@ def test_verdicts_and_confusions_of_a_sample() -> None:
     assert ["stick_slip", "stick_slip", 1] not in confused["open"]
 
 
-def test_trace_errors_recovery_and_times_of_a_sample() -> None:
+def test_trace_errors_recovery_and_times_of_a_sample():
     made = figures(sample())
     assert made["trace"]["n"] == 3
     assert made["trace"]["median"] == pytest.approx(0.2)
@@ -168,7 +164,7 @@ def test_trace_errors_recovery_and_times_of_a_sample() -> None:
     assert made["runtime_s"]["most"] == 9.0
 
 
-def test_detection_curve_of_a_sample() -> None:
+def test_detection_curve_of_a_sample():
     by_size = {(c["low"], c["high"]): c for c in figures(sample())["curve"]}
     assert counted(by_size[0.2, 0.35]["detected"]) == (1, 2)
     assert counted(by_size[0.2, 0.35]["wrong"]) == (1, 2)
@@ -177,7 +173,7 @@ def test_detection_curve_of_a_sample() -> None:
     assert sum(c["exact"]["n"] for c in by_size.values()) == 9
 
 
-def test_resolved_experiments_are_counted() -> None:
+def test_resolved_experiments_are_counted():
     ahead = figures(sample())["next"]
     assert (ahead["ambiguous"], ahead["promised"]) == (4, 2)
     assert counted(ahead["resolved"]) == (1, 2)
@@ -188,7 +184,7 @@ def test_resolved_experiments_are_counted() -> None:
     assert "did not resolve" in page(figures([broken]), "")
 
 
-def test_closed_loops_count_only_with_a_gap() -> None:
+def test_closed_loops_count_only_with_a_gap():
     loops = [loop(1.0, 0.6, 0.5), loop(1.0, 0.9, 0.5), loop(1.0, 1.2, 0.8), loop(1.0, 1.1, 0.9)]
     made = figures([record(names=["creep"], loop=made) for made in loops])["loop"]
     assert (made["n"], made["gap"]) == (4, 3)

@@ -1,9 +1,6 @@
 """Page, statistics and figure of the diagnosis benchmark."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 from typing import Any
 
 from diagnosis_fakes import counted, loop, record, sample, trace
@@ -12,7 +9,7 @@ from benchmarks.diagnosis.report import figures, page, targets, write
 from tests.diagnosis.hidden import EFFECTS
 
 
-def test_targets_are_compared_with_their_statistics() -> None:
+def test_targets_are_compared_with_their_statistics():
     good = [record(names=["creep"], traces={"creep": trace(0.1)}, seed=k) for k in range(3)]
     rows = {row[0]: row for row in targets(figures(good))}
     assert rows["correct name first, sizes above 1"][2:] == ("100.0 % [29.2, 100.0]", 3, True)
@@ -30,7 +27,7 @@ def test_targets_are_compared_with_their_statistics() -> None:
     assert rows["false alarm, clean rigs and decoys"][4] is False
 
 
-def test_page_shows_figure_target_and_number() -> None:
+def test_page_shows_figure_target_and_number():
     text = page(figures(sample()), "--chosen tune")
     assert "`python -m benchmarks diagnosis --chosen tune`" in text
     assert "| correct name first, sizes above 1 | at least 98 % | 60.0 % [14.7, 94.7] | 5 |" in text
@@ -40,7 +37,7 @@ def test_page_shows_figure_target_and_number() -> None:
     assert "Failed runs" not in text
 
 
-def test_same_records_give_same_files(tmp_path: Path) -> None:
+def test_same_records_give_same_files(tmp_path):
     first = write(sample(), tmp_path / "a", "--chosen tune")
     second = write(sample(), tmp_path / "b", "--chosen tune")
     assert [path.name for path in first] == ["diagnosis.md", "diagnosis.json", "diagnosis.png"]
@@ -67,7 +64,7 @@ def tables(cut_percent: float, post_hoc: float) -> dict[str, Any]:
     }
 
 
-def test_measured_tables_and_the_whole_report_have_their_targets() -> None:
+def test_measured_tables_and_the_whole_report_have_their_targets():
     linear = "measured tables, held-out load, linear law: error decrease"
     late = "the same, exponent post hoc, not held out"
     whole = "10 minutes at 50 Hz on 2 cores: whole report"
@@ -81,7 +78,7 @@ def test_measured_tables_and_the_whole_report_have_their_targets() -> None:
     assert {rows[label][1:] for label in (linear, late, whole)} == {("not run", 0, None)}
 
 
-def test_targets_need_enough_cases() -> None:
+def test_targets_need_enough_cases():
     label = "cases of the rarest cause, sizes above 1"
     of_all = [
         record(truth={name: 2.0}, names=[name], seed=k) for name in EFFECTS for k in range(40)
@@ -96,7 +93,7 @@ def test_targets_need_enough_cases() -> None:
     assert "bound 1.0 %" in rows["false alarm, clean rigs and decoys"][1]
 
 
-def test_closed_loops_have_targets() -> None:
+def test_closed_loops_have_targets():
     records = [record(names=["creep"], loop=loop(1.0, after, 0.5)) for after in (0.6, 0.9, 1.2)]
     rows = {row[0]: row[1:] for row in targets(figures(records))}
     part = rows["closed loop, gap of at least 15 %: part recovered, median"]
@@ -105,7 +102,7 @@ def test_closed_loops_have_targets() -> None:
     assert worse[0] == "at most 5 %" and worse[2:] == (3, False)
 
 
-def test_raw_size_is_shown_beside_size() -> None:
+def test_raw_size_is_shown_beside_size():
     truths = [{"name": "creep", "size": 2.0, "raw": 6.5}]
     made = figures([record(names=["creep"], truths=truths)])
     assert made["by_cause"]["creep"]["raw"]["median"] == 3.25

@@ -1,7 +1,5 @@
 """Diagnosis benchmark: cases, resumed runs, studies."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Collection
@@ -19,7 +17,7 @@ from benchmarks.diagnosis import study as diagnosis_study
 from benchmarks.diagnosis.cases import NOISE, Case, cases, make
 from benchmarks.diagnosis.next import DrivenRig, OracleRig
 from benchmarks.diagnosis.report import figures
-from benchmarks.diagnosis.run import Options, rejudged, run, select
+from benchmarks.diagnosis.run import Options, run, select
 from benchmarks.diagnosis.study import study, trace_errors
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
@@ -31,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # --- which cases ---------------------------------------------------------------------------------
 
 
-def test_fractions_are_stratified_and_nested() -> None:
+def test_fractions_are_stratified_and_nested():
     tenth, fifth = (select(Options("tune", fraction=f)) for f in (0.1, 0.2))
     assert set(tenth) < set(fifth)
     for name in hidden.EFFECTS:
@@ -43,7 +41,7 @@ def test_fractions_are_stratified_and_nested() -> None:
     assert select(Options("tune", fraction=0.1, limit=7)) == tenth[:7]
 
 
-def test_kinds_and_names_are_chosen_and_wrong_ones_refused() -> None:
+def test_kinds_and_names_are_chosen_and_wrong_ones_refused():
     chosen = select(Options("tune", kinds=("single", "pair"), names=("creep",)))
     assert {case.kind for case in chosen} == {"single", "pair"}
     assert all("creep" in case.names for case in chosen)
@@ -55,7 +53,7 @@ def test_kinds_and_names_are_chosen_and_wrong_ones_refused() -> None:
         select(Options(fraction=0))
 
 
-def test_options_reproduce_the_command_arguments() -> None:
+def test_options_reproduce_the_command_arguments():
     options = Options("tune", 3, 0.1, ("single",), ("creep", "leak"), 5, 2, True)
     assert options.arguments == (
         "--chosen tune --offset 3 --fraction 0.1 --kind single --name creep leak --limit 5 "
@@ -98,7 +96,7 @@ class Counting:
         return answer(case, stages)
 
 
-def test_run_resumes_after_interruption(tmp_path: Path) -> None:
+def test_run_resumes_after_interruption(tmp_path):
     class Stopped(BaseException):
         pass
 
@@ -122,13 +120,13 @@ def test_run_resumes_after_interruption(tmp_path: Path) -> None:
     assert run(Options(folder=tmp_path, force=True), act=again).computed == total
 
 
-def test_failed_case_is_stored_and_counts_as_wrong(tmp_path: Path) -> None:
+def test_failed_case_is_stored_and_counts_as_wrong(tmp_path):
     report = run(Options(kinds=("decoy",), folder=tmp_path), act=answer)
     assert len(report.failed) == 2 and report.failed[0].endswith(": ValueError: no")
     assert counted(figures(report.records)["false_alarms"]) == (2, 2)
 
 
-def test_corrupt_record_is_recomputed(tmp_path: Path) -> None:
+def test_corrupt_record_is_recomputed(tmp_path):
     options = Options(kinds=("pair",), folder=tmp_path)
     before = run(options, act=answer).records
     sorted(tmp_path.glob("*.json"))[0].write_text("{}")
@@ -137,9 +135,7 @@ def test_corrupt_record_is_recomputed(tmp_path: Path) -> None:
     assert report.records == before
 
 
-def test_records_belong_to_the_numbers_of_rule_and_causes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_records_belong_to_the_numbers_of_rule_and_causes(tmp_path, monkeypatch):
     options = Options(kinds=("pair",), folder=tmp_path)
     run(options, act=answer)
     known = diagnosis.engine_digest()
@@ -158,7 +154,7 @@ def test_records_belong_to_the_numbers_of_rule_and_causes(
     assert run(options, act=answer).computed == 0
 
 
-def test_closed_loops_and_experiments_run_for_their_cases(tmp_path: Path) -> None:
+def test_closed_loops_and_experiments_run_for_their_cases(tmp_path):
     counting = Counting()
     options = Options("tune", fraction=0.1, folder=tmp_path, loops=2, next=True)
     report = run(options, act=counting)
@@ -173,7 +169,7 @@ def test_closed_loops_and_experiments_run_for_their_cases(tmp_path: Path) -> Non
     assert counted(made["next"]["resolved"]) == (len(ahead), len(ahead))
 
 
-def test_failed_closed_loop_keeps_verdict(tmp_path: Path) -> None:
+def test_failed_closed_loop_keeps_verdict(tmp_path):
     def failing(case: Case, stages: Collection[str]) -> dict[str, Any]:
         return {**answer(case, stages), "failure": "no loop" if "loop" in stages else None}
 
@@ -189,9 +185,7 @@ def deadly(case: Case, stages: Collection[str]) -> dict[str, Any]:
     return answer(case, stages)
 
 
-def test_case_that_kills_its_worker_is_recorded_as_failed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_case_that_kills_its_worker_is_recorded_as_failed(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
     get_reusable_executor().shutdown(wait=True)
     options = Options(kinds=("single",), names=("creep", "leak"), folder=tmp_path, jobs=2)
@@ -201,41 +195,10 @@ def test_case_that_kills_its_worker_is_recorded_as_failed(
     assert "its worker died 3 times" in report.failed[0]
 
 
-def test_records_are_rejudged_by_the_present_rule(tmp_path: Path) -> None:
-    def rival(names: list[str], gain: float) -> dict[str, Any]:
-        return {"names": names, "forms": ["linear"], "gain": gain, "better": 0.0}
-
-    left = {"r2": [0.0, 0.0], "rest": 0.0, "peaks": [], "peak": 0.0, "excess": 1.0}
-    evidence = {
-        "blocks": 25,
-        "levels": [
-            {"gain": 0.0, "added": 0.0, "unsure": 0.0, "left": left, "rivals": []},
-            {
-                "gain": 2.0,
-                "added": 2.0,
-                "unsure": 0.0,
-                "left": left,
-                "rivals": [rival(["leak"], 2.0)],
-            },
-        ],
-    }
-
-    def judged(case: Case, stages: Collection[str]) -> dict[str, Any]:
-        known = answer(case, stages)
-        return known | {"evidence": evidence, "verdict": "adequate", "names": []}
-
-    options = Options(kinds=("single",), names=("creep", "leak"), folder=tmp_path)
-    run(options, act=judged)
-    made = rejudged(options)
-    assert [one["verdict"] for one in made] == ["named", "named"]
-    assert [one["names"] for one in made] == [["leak"], ["leak"]]
-    assert rejudged(Options(kinds=("clean",), folder=tmp_path)) == []
-
-
 # --- a study -------------------------------------------------------------------------------------
 
 
-def test_impossible_case_is_a_failed_record(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_impossible_case_is_a_failed_record(monkeypatch):
     def never(case: Case) -> None:
         raise ValueError("on none can the effect be so large")
 
@@ -248,7 +211,7 @@ def test_impossible_case_is_a_failed_record(monkeypatch: pytest.MonkeyPatch) -> 
         study(case, ("loops",))
 
 
-def test_traces_are_compared_on_the_output_with_the_largest_effect() -> None:
+def test_traces_are_compared_on_the_output_with_the_largest_effect():
     rng = np.random.default_rng(0)
     true = np.stack(
         [0.1 * NOISE[0] * rng.standard_normal(400), NOISE[1] * rng.standard_normal(400)]
@@ -286,7 +249,7 @@ def made_rig(name: str) -> Any:
 
 
 @pytest.mark.parametrize("name", ["creep", "dead_time", "sensor_delay"])
-def test_oracle_equals_the_driven_rig_without_noise(name: str) -> None:
+def test_oracle_equals_the_driven_rig_without_noise(name):
     made = made_rig(name)
     rig, oracle = DrivenRig(made, 30.0, 24.0), OracleRig(made, 30.0, 24.0)
     commands = np.repeat(np.random.default_rng(0).uniform(0.0, 5e5, 6), 30)
@@ -310,7 +273,7 @@ def test_oracle_equals_the_driven_rig_without_noise(name: str) -> None:
 
 
 @pytest.mark.parametrize("seconds", [30.0, 60.0])
-def test_brief_recording_is_the_start_of_a_whole_one(seconds: float) -> None:
+def test_brief_recording_is_the_start_of_a_whole_one(seconds):
     brief = make(Case("brief", 11, campaign="short", seconds=seconds))
     whole = make(Case("clean", 11, campaign="short"))
     n = len(brief.recording.time)

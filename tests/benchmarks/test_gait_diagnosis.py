@@ -1,7 +1,5 @@
 """Diagnosis of the horizontal force missing in yeh2010, Eq. 1, on held-out strides."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -29,12 +27,12 @@ def hiding(name: str, value: float, seed: int = 1) -> GaitRecording:
 
 
 @pytest.fixture(scope="module")
-def natural() -> study.Outcome:
+def natural():
     return study.diagnose(record(NATURAL_STRIDE, STRIDES, 1))
 
 
 @pytest.mark.parametrize("pace", [NATURAL_STRIDE, PAPER_STRIDE])
-def test_full_balance_is_equation_1_with_force_weight_and_inertia(pace: float) -> None:
+def test_full_balance_is_equation_1_with_force_weight_and_inertia(pace):
     made = record(pace, 3, noise=0.0)
     whole = torques(made, horizontal_share=1.0, weight_share=1.0, inertia_share=1.0)
     seen = np.isfinite(made.torque)
@@ -44,7 +42,7 @@ def test_full_balance_is_equation_1_with_force_weight_and_inertia(pace: float) -
     assert np.allclose(part - whole, made.horizontal * height)
 
 
-def test_strides_differ_and_are_held_out_whole() -> None:
+def test_strides_differ_and_are_held_out_whole():
     made = record(NATURAL_STRIDE, STRIDES, 1)
     lengths = np.bincount(made.stride)
     assert len(lengths) == STRIDES
@@ -54,7 +52,7 @@ def test_strides_differ_and_are_held_out_whole() -> None:
     assert all(len(np.unique(blocks.train[made.stride == k])) == 1 for k in range(STRIDES))
 
 
-def test_horizontal_force_is_named_at_natural_pace(natural: study.Outcome) -> None:
+def test_horizontal_force_is_named_at_natural_pace(natural):
     assert natural.decision.verdict == "named"
     assert natural.names[0] == "horizontal_force"
     assert natural.values["horizontal.share"] == pytest.approx(1.0, abs=0.05)
@@ -69,21 +67,21 @@ def test_horizontal_force_is_named_at_natural_pace(natural: study.Outcome) -> No
     assert after < 1.3 * natural.problem.noise[0]
 
 
-def test_two_paces_identify_the_share_within_a_few_percent() -> None:
+def test_two_paces_identify_the_share_within_a_few_percent():
     both = record(NATURAL_STRIDE, STRIDES, 1).and_then(record(PAPER_STRIDE, 9, 51))
     found = study.diagnose(both)
     assert found.names[0] == "horizontal_force"
     assert found.values["horizontal.share"] == pytest.approx(1.0, abs=0.02)
 
 
-def test_shank_weight_is_named_at_the_papers_pace() -> None:
+def test_shank_weight_is_named_at_the_papers_pace():
     found = study.diagnose(record(PAPER_STRIDE, STRIDES, 1))
     assert "shank_weight" in found.names  # which of two is found first depends on the draw
     assert "horizontal_force" not in found.names
     assert found.error(found.base) < 4.0
 
 
-def test_second_pace_removes_confusion_of_one_pace() -> None:
+def test_second_pace_removes_confusion_of_one_pace():
     one = study.diagnose(record(3.0, STRIDES, 1))
     assert "horizontal_force" not in one.names
     assert one.gain_of("horizontal_force") > 0.8 * one.gain_of("lean_bias")
@@ -102,7 +100,7 @@ def test_second_pace_removes_confusion_of_one_pace() -> None:
         ("weight_share", 1.0, "shank_weight"),
     ],
 )
-def test_other_effects_are_not_named_horizontal_force(name: str, value: float, cause: str) -> None:
+def test_other_effects_are_not_named_horizontal_force(name, value, cause):
     found = study.diagnose(hiding(name, value))
     assert found.names == ((cause,) if cause else ())
     assert found.decision.verdict == ("named" if cause else "adequate")
@@ -110,7 +108,7 @@ def test_other_effects_are_not_named_horizontal_force(name: str, value: float, c
         assert found.values[name.replace("_", ".")] == pytest.approx(value, rel=0.1)
 
 
-def test_noise_is_separated_from_motion_and_model_error() -> None:
+def test_noise_is_separated_from_motion_and_model_error():
     stride = np.repeat(np.arange(10), 120)
     values = 50.0 * np.sin(np.arange(1200) / 20.0) + 100.0 * stride
     noisy = values + 1.5 * np.random.default_rng(0).standard_normal(1200)
@@ -118,13 +116,13 @@ def test_noise_is_separated_from_motion_and_model_error() -> None:
     assert study.white_noise(noisy, stride) == pytest.approx(1.5, rel=0.1)
 
 
-def test_recordings_of_two_legs_are_not_concatenated() -> None:
+def test_recordings_of_two_legs_are_not_concatenated():
     made = record(NATURAL_STRIDE, 2)
     with pytest.raises(ValueError, match="of one leg"):
         made.and_then(replace(made, leg=replace(made.leg, body_mass=60.0)))
 
 
-def test_results_page_names_the_horizontal_force(capsys: pytest.CaptureFixture[str]) -> None:
+def test_results_page_names_the_horizontal_force(capsys):
     study.main(strides=12)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("1.224 s a stride: named; horizontal.share 1.0")

@@ -3,8 +3,6 @@
 MuJoCo is not needed here.
 """
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 
@@ -23,7 +21,7 @@ SEED = 7
 
 
 @pytest.fixture(scope="module")
-def force() -> np.ndarray:
+def force():
     return campaign(SEED)
 
 

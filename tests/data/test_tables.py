@@ -1,7 +1,5 @@
 """The measured table: contents, scatter, and the cells that its reader refuses."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 
@@ -9,14 +7,14 @@ import numpy as np
 import pytest
 
 from pam_envs.data import tables
-from pam_envs.data.tables import ContractionTable, load_contraction_table
+from pam_envs.data.tables import load_contraction_table
 
 HEADER = "load_kg,direction,pressure_bar,repeat,contraction_mm"
 CYCLE = ("0,inflation,0,1,0", "0,inflation,1,1,0.9", "0,deflation,0,1,0.2")
 
 
 @pytest.fixture(scope="module")
-def table() -> ContractionTable:
+def table():
     return load_contraction_table()
 
 

@@ -1,7 +1,5 @@
 """Verdicts on a fixed sample of rigs with and without hidden effects."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
@@ -12,30 +10,21 @@ import pytest
 
 from benchmarks.diagnosis.cases import Case, make
 from benchmarks.diagnosis.study import diagnosed, study
-from pam_envs.kernels.build import COMPILED
+from tests.diagnosis.conftest import needs_kernels
 from tests.diagnosis.hidden import EFFECTS
 
 pytestmark = [
+    needs_kernels,
     pytest.mark.xdist_group("hidden effects"),  # one process makes the sample
     pytest.mark.timeout(2700),  # the first test waits for all of it
 ]
-compiled = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
 
 SIZE = 3.0
 SEED = 41_000_000
 """The first of the sample, chosen before any was run; no set of the benchmark has such seeds."""
 SAMPLED = (
-    "creep",
-    "leak",
-    "dead_time",
-    "slew_limit",
-    "sensor_bias",
-    "viscous_loss",
-    "temperature",
-    "threshold_pressure",
-    "resonance",
-    "slip_step",
-    "supply_droop",
+    *("creep", "leak", "dead_time", "slew_limit", "sensor_bias", "viscous_loss", "temperature"),
+    *("threshold_pressure", "resonance", "slip_step", "supply_droop"),
 )
 REST = [name for name in EFFECTS if name not in SAMPLED]
 NOT_FOUND = "stick_slip"
@@ -58,7 +47,7 @@ Records = Mapping[Case, dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
-def records() -> Records:
+def records():
     """Study of every case of the sample, two at a time."""
     chosen = [*SINGLE, *ADEQUATE, *FAINT, PAIR, UNKNOWN, IDLE]
     with ProcessPoolExecutor(min(2, os.cpu_count() or 1), get_context("spawn")) as pool:
@@ -72,9 +61,8 @@ def one(case: Case) -> Any:
     return pytest.param(case, id=case.names[0], marks=marks)
 
 
-@compiled
 @pytest.mark.parametrize("case", [one(case) for case in SINGLE])
-def test_hidden_effect_is_named_first(case: Case, records: Records) -> None:
+def test_hidden_effect_is_named_first(case, records):
     found = records[case]
     assert found["failure"] is None
     assert found["truths"][0]["size"] == pytest.approx(SIZE, rel=0.05)
@@ -84,31 +72,27 @@ def test_hidden_effect_is_named_first(case: Case, records: Records) -> None:
     assert max(before[name] / after[name] for name in after) > 1.2
 
 
-@compiled
 @pytest.mark.parametrize("case", ADEQUATE, ids=lambda case: f"{case.kind}-{case.seed - SEED}")
-def test_clean_rig_is_adequate(case: Case, records: Records) -> None:
+def test_clean_rig_is_adequate(case, records):
     found = records[case]
     assert found["failure"] is None
     assert (found["verdict"], found["names"]) == ("adequate", [])
 
 
-@compiled
 @pytest.mark.parametrize("case", FAINT, ids=lambda case: case.names[0])
-def test_effect_below_noise_is_not_misnamed(case: Case, records: Records) -> None:
+def test_effect_below_noise_is_not_misnamed(case, records):
     found = records[case]
     assert found["failure"] is None
     assert found["verdict"] in ("adequate", "named", "ambiguous")
     assert found["verdict"] == "adequate" or found["names"] == list(case.names)
 
 
-@compiled
-def test_recording_without_motion_is_insufficient(records: Records) -> None:
+def test_recording_without_motion_is_insufficient(records):
     found = records[IDLE]
     assert (found["verdict"], found["names"]) == ("insufficient", [])
 
 
-@compiled
-def test_wrong_base_parameter_is_calibrated_not_named() -> None:
+def test_wrong_base_parameter_is_calibrated_not_named():
     made = make(Case("decoy", SEED + 22))
     found = diagnosed(made.recording, made.sheet)
     calibrated = {entry["name"]: entry for entry in found.report["calibration"]}
@@ -119,22 +103,20 @@ def test_wrong_base_parameter_is_calibrated_not_named() -> None:
     assert not found.causes
 
 
-@compiled
-def test_two_hidden_effects_are_named(records: Records) -> None:
+def test_two_hidden_effects_are_named(records):
     found = records[PAIR]
     assert found["failure"] is None
     assert found["verdict"] in ("named", "ambiguous")
     assert set(found["names"]) == set(PAIR.names)
 
 
-@compiled
-def test_effect_outside_catalogue_is_unexplained(records: Records) -> None:
+def test_effect_outside_catalogue_is_unexplained(records):
     found = records[UNKNOWN]
     assert found["failure"] is None
     assert found["verdict"] == "unexplained"
 
 
-def test_sample_is_computed_in_one_process(request: pytest.FixtureRequest) -> None:
+def test_sample_is_computed_in_one_process(request):
     if not request.config.getoption("loadgroup", False):
         pytest.skip("the tests are not spread over processes by group")
     assert request.node.nodeid.endswith("@hidden effects")

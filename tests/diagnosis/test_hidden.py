@@ -1,9 +1,6 @@
 """Hidden rigs: independence of the library, exact neutrality, physical plausibility."""
 
-from __future__ import annotations
-
 import ast
-import csv
 import dataclasses
 import sys
 from pathlib import Path
@@ -12,34 +9,15 @@ import numpy as np
 import pytest
 
 from tests.diagnosis import hidden
-from tests.diagnosis.hidden import Campaign, Effect, Stepper
+from tests.diagnosis.conftest import NOISE, base_of, effect_of, size
+from tests.diagnosis.hidden import Campaign, Stepper
 
 FOLDER = Path(hidden.__file__).parent
 ALLOWED = {"numpy", "scipy", "numba", *sys.stdlib_module_names}
 ALL = (*hidden.EFFECTS, *hidden.TUNING_UNKNOWN, *hidden.FINAL_UNKNOWN)
-CHANNELS = {
-    "contraction_mm": hidden.CONTRACTION_NOISE_MM,
-    "pressure_bar": hidden.PRESSURE_NOISE_BAR,
-}
 
 
-def _base(seed: int = 3) -> hidden.Base:
-    return hidden.draw_base(np.random.default_rng(seed))
-
-
-def _effect(name: str, seed: int = 1) -> Effect:
-    return hidden.draw_effect(name, np.random.default_rng(seed))
-
-
-def _size(one: dict, other: dict) -> float:
-    """Return the RMS of the difference over that of the noise, on the louder channel."""
-    return max(
-        float(np.sqrt(np.mean((one[name] - other[name]) ** 2))) / noise
-        for name, noise in CHANNELS.items()
-    )
-
-
-def _single(command: np.ndarray, load: float = 0.0, period: float = 0.02) -> Campaign:
+def single(command: np.ndarray, load: float = 0.0, period: float = 0.02) -> Campaign:
     count = command.size
     return Campaign(
         command,
@@ -52,23 +30,18 @@ def _single(command: np.ndarray, load: float = 0.0, period: float = 0.02) -> Cam
 
 
 @pytest.fixture(scope="module")
-def short() -> Campaign:
-    return hidden.campaign_short()
-
-
-@pytest.fixture(scope="module")
-def standard() -> Campaign:
+def standard():
     return hidden.campaign_standard()
 
 
 @pytest.fixture(scope="module")
-def clean_short(short) -> dict:
-    return hidden.simulate(_base(), [], short)
+def clean_short(short):
+    return hidden.simulate(base_of(), [], short)
 
 
 @pytest.fixture(scope="module")
-def clean(standard) -> dict:
-    return hidden.simulate(_base(), [], standard)
+def clean(standard):
+    return hidden.simulate(base_of(), [], standard)
 
 
 def _imports(tree: ast.AST) -> set[str]:
@@ -98,56 +71,49 @@ def test_there_are_25_effects_and_two_disjoint_sets_outside_the_catalogue():
     assert len(hidden.TUNING_UNKNOWN) >= 4
     assert len(hidden.FINAL_UNKNOWN) >= 4
     assert len(set(ALL)) == len(ALL)
-    with pytest.raises(ValueError, match="no effect is called 'magic'"):
-        _effect("magic")
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_zero_amplitude_is_exactly_clean(name, short, clean_short):
-    base, effect = _base(), _effect(name)
+    base, effect = base_of(), effect_of(name)
     zero = hidden.simulate(base, [(effect, 0.0)], short)
     assert all(np.array_equal(clean_short[key], zero[key]) for key in clean_short)
-    assert _size(hidden.simulate(base, [(effect, 1e-4)], short), clean_short) < 0.1
+    assert size(hidden.simulate(base, [(effect, 1e-4)], short), clean_short) < 0.1
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_each_effect_is_visible_and_physical(name, short, clean_short):
-    base, effect = _base(), _effect(name)
+    base, effect = base_of(), effect_of(name)
     shown = hidden.simulate(base, [(effect, 5.0)], short)
-    assert _size(shown, clean_short) > 1.0
+    assert size(shown, clean_short) > 1.0
     strong = hidden.simulate(base, [(effect, 15.0)], short)
     assert np.all(np.isfinite(strong["contraction_mm"]))
-    assert _size(strong, clean_short) > _size(shown, clean_short)
+    assert size(strong, clean_short) > size(shown, clean_short)
     assert np.ptp(strong["contraction_mm"]) < 0.3 * base.length_mm
     assert -0.7 < strong["pressure_bar"].min() <= strong["pressure_bar"].max() < 9.0
 
 
-def test_negative_amplitude_is_refused(short):
-    with pytest.raises(ValueError, match=r"amplitude -1\.0 of creep is negative"):
-        hidden.simulate(_base(), [(_effect("creep"), -1.0)], short)
-
-
 def test_same_seeds_give_the_same_recording(short):
     def recording(noise_seed: int) -> dict:
-        effects = [(_effect("creep"), 2.0), (_effect("leak"), 1.0)]
-        return hidden.make_recording(_base(), effects, short, noise_seed)
+        effects = [(effect_of("creep"), 2.0), (effect_of("leak"), 1.0)]
+        return hidden.make_recording(base_of(), effects, short, noise_seed)
 
     one, same, other = recording(5), recording(5), recording(6)
     assert all(np.array_equal(one[key], same[key]) for key in one)
     assert not np.array_equal(one["contraction_mm"], other["contraction_mm"])
-    assert _base(4) == _base(4) != _base(5)
-    assert _effect("creep", 2) == _effect("creep", 2) != _effect("creep", 3)
+    assert base_of(4) == base_of(4) != base_of(5)
+    assert effect_of("creep", 2) == effect_of("creep", 2) != effect_of("creep", 3)
 
 
 @pytest.mark.parametrize("factor", [1.0, 3.0])
 def test_noise_has_declared_size_and_slow_part(factor, standard, clean):
-    base = dataclasses.replace(_base(), coloured=0.5, grain_mm=0.0, grain_bar=0.0)
-    noise = {name: [] for name in CHANNELS}
+    base = dataclasses.replace(base_of(), coloured=0.5, grain_mm=0.0, grain_bar=0.0)
+    noise = {name: [] for name in NOISE}
     for seed in range(4):
         columns = hidden.make_recording(base, [], standard, seed, factor)
-        for name in CHANNELS:
+        for name in NOISE:
             noise[name].append(columns[name] - clean[name])
-    for name, rms in CHANNELS.items():
+    for name, rms in NOISE.items():
         rows = np.array(noise[name])
         assert np.sqrt(np.mean(rows**2)) == pytest.approx(factor * rms, rel=0.06)
         lagged = np.mean(rows[:, 50:] * rows[:, :-50]) / np.mean(rows**2)
@@ -182,7 +148,7 @@ def test_repeated_segments_have_the_same_commands_and_loads(standard):
 
 
 def test_closed_valve_holds_pressure_without_leak(standard, clean):
-    leaking = hidden.simulate(_base(), [(_effect("leak"), 5.0)], standard)
+    leaking = hidden.simulate(base_of(), [(effect_of("leak"), 5.0)], standard)
     assert standard.closed_segments() == ["shut_a", "shut_b"]
     for label, level in (("shut_a", 2.0), ("shut_b", 4.5)):
         rows = standard.segment == label
@@ -197,21 +163,21 @@ def test_long_short_and_idle_campaigns(short):
     assert 110.0 < short.time[-1] < 130.0
     idle = hidden.campaign_idle()
     assert np.ptp(idle.command_bar) == 0.0
-    assert np.ptp(hidden.simulate(_base(), [], idle)["contraction_mm"]) < 0.01
+    assert np.ptp(hidden.simulate(base_of(), [], idle)["contraction_mm"]) < 0.01
 
 
 def test_clean_regulator_is_a_first_order_lag():
-    base = _base()
-    step = hidden.simulate(base, [], _single(np.full(200, 3.0), period=0.01))
+    base = base_of()
+    step = hidden.simulate(base, [], single(np.full(200, 3.0), period=0.01))
     expected = base.gain * 3.0 * (1.0 - np.exp(-step["time"] / base.lag))
     assert np.allclose(step["pressure_bar"], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_loop_width_and_stroke_are_as_drawn(seed):
-    base = _base(seed)
+    base = base_of(seed)
     half = np.linspace(0.0, 6.0, 2000)
-    run = hidden.simulate(base, [], _single(np.concatenate([half, half[::-1], half, half[::-1]])))
+    run = hidden.simulate(base, [], single(np.concatenate([half, half[::-1], half, half[::-1]])))
     up, down = slice(4000, 6000), slice(6000, 8000)
     middle = 0.5 * run["contraction_mm"].max()
     rising = np.interp(middle, run["contraction_mm"][up], run["pressure_bar"][up])
@@ -221,10 +187,10 @@ def test_loop_width_and_stroke_are_as_drawn(seed):
 
 
 def test_muscle_at_rest_moves_only_with_load_changes():
-    base = _base()
-    steady = hidden.simulate(base, [], _single(np.zeros(100), load=30.0))
+    base = base_of()
+    steady = hidden.simulate(base, [], single(np.zeros(100), load=30.0))
     assert np.max(np.abs(steady["contraction_mm"])) < 1e-6
-    changed = _single(np.zeros(200))
+    changed = single(np.zeros(200))
     changed.load_N[50:] = 30.0
     assert hidden.simulate(base, [], changed)["contraction_mm"][-1] < -0.2
 
@@ -242,8 +208,8 @@ def test_decoys_are_outside_the_usual_range():
 def test_stepped_rig_equals_campaign(name):
     rng = np.random.default_rng(0)
     command = np.repeat(rng.uniform(0.0, 5.0, 12), 40)
-    base, effects = _base(), [(_effect(name), 3.0)]
-    rows = hidden.simulate(base, effects, _single(command, load=30.0, period=0.01))
+    base, effects = base_of(), [(effect_of(name), 3.0)]
+    rows = hidden.simulate(base, effects, single(command, load=30.0, period=0.01))
     stepper = Stepper(base, effects, 30.0, 0, period=0.01, noise_factor=0.0)
     grain = max(base.grain_mm, 1e-9)
     for row, value in enumerate(command[:-1], start=1):
@@ -254,7 +220,7 @@ def test_stepped_rig_equals_campaign(name):
 
 
 def test_reset_restarts_rig_and_noise():
-    stepper = Stepper(_base(), [(_effect("creep"), 3.0)], 15.0, noise_seed=4)
+    stepper = Stepper(base_of(), [(effect_of("creep"), 3.0)], 15.0, noise_seed=4)
     first = [stepper.step(3.0) for _ in range(50)]
     stepper.reset(4)
     assert [stepper.step(3.0) for _ in range(50)] == first
@@ -262,29 +228,21 @@ def test_reset_restarts_rig_and_noise():
     assert [stepper.step(3.0) for _ in range(50)] != first
 
 
-def test_period_must_be_whole_milliseconds():
-    with pytest.raises(ValueError, match=r"period 0\.0125 s is not a whole number"):
-        Stepper(_base(), [], 0.0, 0, period=0.0125)
-
-
-def test_csv_file_equals_recording(short, tmp_path):
-    columns = hidden.make_recording(_base(), [], short, 0)
-    path = tmp_path / "rig.csv"
-    hidden.write_csv(columns, path)
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert list(rows[0]) == [
-        *("time_s", "segment", "pressure_command_bar", "pressure_bar"),
-        *("contraction_mm", "load_N", "temperature_C"),
-    ]
-    assert len(rows) == short.command_bar.size
-    assert [row["segment"] for row in rows] == columns["segment"].tolist()
-    read = np.array([float(row["contraction_mm"]) for row in rows])
-    assert np.allclose(read, columns["contraction_mm"], atol=6e-6)
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: effect_of("magic"), "no effect is called 'magic'"),
+        (lambda: effect_of("creep").strength(-1.0), r"amplitude -1\.0 of creep is negative"),
+        (lambda: Stepper(base_of(), [], 0.0, 0, period=0.0125), r"period 0\.0125 s is not a whole"),
+    ],
+)
+def test_impossible_rigs_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
 
 
 def test_rig_file_declares_the_constants(standard):
-    base = _base()
+    base = base_of()
     sheet = hidden.rig_yaml(base, standard, noise_factor=3.0)
     assert sheet["plant"] == "single_muscle"
     assert sheet["muscle"] == {"rest_length_mm": base.length_mm, "diameter_mm": 10.0}

@@ -1,9 +1,6 @@
 """Third-party cause: one file, and a second one for its hidden counterpart."""
 
-from __future__ import annotations
-
 import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +8,8 @@ import pytest
 from benchmarks.diagnosis.cases import recording_of, sheet_of
 from pam_envs.diagnosis import diagnose
 from pam_envs.diagnosis.causes import by_name, causes_in
-from pam_envs.kernels.build import COMPILED
 from tests.diagnosis import hidden
+from tests.diagnosis.conftest import needs_kernels
 
 CAUSE = '''
 """Clogged silencer: the muscle exhausts more slowly than it fills."""
@@ -37,15 +34,15 @@ RIVALS = ("creep", "dead_time", "sensor_bias", "slew_limit", "temperature")
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     (tmp_path / "causes").mkdir()
     (tmp_path / "causes/clogged_silencer.py").write_text(CAUSE)
     (tmp_path / "hidden.py").write_text(HIDDEN)
     return tmp_path
 
 
-@pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
-def test_cause_from_a_folder_is_found_in_the_rig_that_hides_its_counterpart(folder: Path) -> None:
+@needs_kernels
+def test_cause_from_a_folder_is_found_in_the_rig_that_hides_its_counterpart(folder):
     random = np.random.default_rng(8)
     base, campaign = hidden.draw_base(random), hidden.campaign_standard(2)
     effect = runpy.run_path(str(folder / "hidden.py"))["KIND"].effect("clogged_silencer", random)
@@ -58,7 +55,7 @@ def test_cause_from_a_folder_is_found_in_the_rig_that_hides_its_counterpart(fold
     assert found.plant.regulator.exhaust_ratio > 1.0
 
 
-def test_folder_of_causes_is_checked(folder: Path) -> None:
+def test_folder_of_causes_is_checked(folder):
     (cause,) = causes_in(folder / "causes")
     assert cause.name == "clogged_silencer"
     (folder / "causes/notes.py").write_text("TEXT = 'no cause'\n")

@@ -1,7 +1,5 @@
 """The shipped plants are identified from the shipped readings, with their identifiability."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -23,32 +21,26 @@ def residual(plant: SingleMuscle) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def fits() -> dict[str, cc.CyclesFit]:
+def fits():
     return {kind: cc.fit_cycles(CYCLES, kind) for kind in kinds()}
 
 
 @pytest.mark.parametrize("kind", kinds())
-def test_shipped_plant_equals_the_identified_plant(
-    kind: str, fits: dict[str, cc.CyclesFit]
-) -> None:
+def test_shipped_plant_equals_the_identified_plant(kind, fits):
     shipped, fitted = residual(SingleMuscle.mas10(kind)), fits[kind].residual
     assert np.abs(shipped - fitted).max() < 2e-5  # 0.02 mm: the optimum is flat in places
     assert np.sqrt(np.mean(shipped**2)) == pytest.approx(np.sqrt(np.mean(fitted**2)), rel=1e-3)
 
 
 @pytest.mark.parametrize("kind", ["maxwell_slip", "preisach"])
-def test_fitted_loop_widths_agree_within_a_third_of_a_millimetre(
-    kind: str, fits: dict[str, cc.CyclesFit]
-) -> None:
+def test_fitted_loop_widths_agree_within_a_third_of_a_millimetre(kind, fits):
     pressures, measured, model = fits[kind].widths()
     assert pressures.tolist() == [3.5e5, 4.5e5, 3.5e5]
     assert np.allclose(measured, [3.29e-3, 2.82e-3, 2.40e-3])
     assert np.abs(model - measured).max() < 0.3e-3
 
 
-def test_fit_residuals_are_near_the_repeatability_of_the_readings(
-    fits: dict[str, cc.CyclesFit],
-) -> None:
+def test_fit_residuals_are_near_the_repeatability_of_the_readings(fits):
     floor = cc.repeatability_floor(TABLE)
     assert floor == pytest.approx(0.168e-3, abs=1e-6)
     assert fits["maxwell_slip"].rms() < 0.25e-3
@@ -56,7 +48,7 @@ def test_fit_residuals_are_near_the_repeatability_of_the_readings(
     assert fits["none"].rms() > 3 * fits["maxwell_slip"].rms()
 
 
-def test_every_member_of_the_ensemble_fits_about_as_well() -> None:
+def test_every_member_of_the_ensemble_fits_about_as_well():
     for kind in ("maxwell_slip", "preisach"):
         plant = SingleMuscle.mas10(kind)
         members = plant.members()
@@ -68,7 +60,7 @@ def test_every_member_of_the_ensemble_fits_about_as_well() -> None:
         assert len(drives) == len(members)  # equally good, and different
 
 
-def test_rank_reveals_unidentifiable_parameters(fits: dict[str, cc.CyclesFit]) -> None:
+def test_rank_reveals_unidentifiable_parameters(fits):
     found = cc.identifiability(fits["maxwell_slip"])
     fixed = dict(zip(found.names, found.fixed, strict=True))
     assert found.rank < len(found.names)
@@ -79,7 +71,7 @@ def test_rank_reveals_unidentifiable_parameters(fits: dict[str, cc.CyclesFit]) -
     assert fixed["hysteresis.width_per_load"] > 0.9
 
 
-def test_known_muscle_is_recovered_from_its_own_cycles() -> None:
+def test_known_muscle_is_recovered_from_its_own_cycles():
     true = SingleMuscle.mas10("maxwell_slip").replace(
         {"muscle.area": 9.5e-4, "hysteresis.width_per_load": -0.03}
     )
@@ -90,7 +82,7 @@ def test_known_muscle_is_recovered_from_its_own_cycles() -> None:
     assert fit.plant.value("hysteresis.width_per_load") == pytest.approx(-0.03, abs=0.005)
 
 
-def test_preisach_is_congruent_in_drive_and_not_in_contraction() -> None:
+def test_preisach_is_congruent_in_drive_and_not_in_contraction():
     inner, outer = minor_loops(SingleMuscle.mas10("preisach"))
     assert inner < 1e-9
     assert outer > 0.02

@@ -1,7 +1,5 @@
 """Transfer functions from frequency responses: known ones are recovered, fits are stable."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Identification of hysteresis models from their own records, and its rank."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """First-order curves of a joint: the test for a symmetric Preisach operator."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

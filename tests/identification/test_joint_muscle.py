@@ -1,7 +1,5 @@
 """One muscle of a joint under a load has asymmetric hysteresis, its joint symmetric."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from pam_envs.identification.joint_muscle import HangingMuscle
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 
-def test_joint_passes_the_symmetry_test_and_one_muscle_fails_it() -> None:
+def test_joint_passes_the_symmetry_test_and_one_muscle_fails_it():
     found = verdicts()
     for name in ("paper joint", "measured joint"):
         assert found[name].verdict.startswith("passes as a symmetric Preisach operator")
@@ -25,7 +23,7 @@ def test_joint_passes_the_symmetry_test_and_one_muscle_fails_it() -> None:
     assert single.model.start == "low"
 
 
-def test_joints_pass_with_either_hysteresis_and_unequal_muscles_do_not() -> None:
+def test_joints_pass_with_either_hysteresis_and_unequal_muscles_do_not():
     from pam_envs.identification.joint_forc import measure_joint
 
     for joint in (AntagonisticJoint.paper("preisach"), AntagonisticJoint.measured("preisach")):
@@ -34,7 +32,7 @@ def test_joints_pass_with_either_hysteresis_and_unequal_muscles_do_not() -> None
     assert not measure_joint(uneven.rest_angles, uneven.angle_range[1]).symmetric
 
 
-def test_muscle_at_rest_balances_its_load() -> None:
+def test_muscle_at_rest_balances_its_load():
     """Force of the law less friction, computed with separate plays."""
     joint = AntagonisticJoint.paper("maxwell_slip")
     operator, hysteresis = joint.hysteresis.operator, joint.hysteresis
@@ -56,6 +54,6 @@ def test_muscle_at_rest_balances_its_load() -> None:
 @pytest.mark.parametrize(
     "joint", [AntagonisticJoint.reduced(), AntagonisticJoint.paper("none")], ids=["reduced", "none"]
 )
-def test_plant_without_hysteresis_of_its_muscles_is_refused(joint: AntagonisticJoint) -> None:
+def test_plant_without_hysteresis_of_its_muscles_is_refused(joint):
     with pytest.raises(ValueError, match="has no muscle with hysteresis"):
         HangingMuscle(joint)

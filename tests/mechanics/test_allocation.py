@@ -1,7 +1,5 @@
 """Allocation to two bundles: exact inside the feasible set, torque first outside."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -58,14 +56,14 @@ def targets(number: int) -> list[tuple[float, float, float]]:
     return [tuple(row) for row in drawn.tolist()]
 
 
-def test_stiffness_is_the_slope_of_the_torque() -> None:
+def test_stiffness_is_the_slope_of_the_torque():
     h = 1e-6
     for angle, (a, b) in itertools.product(ANGLES, itertools.product(BOX[:2], BOX[2:])):
         slope = (given(a, b, angle + h)[0] - given(a, b, angle - h)[0]) / (2.0 * h)
         assert given(a, b, angle)[1] == pytest.approx(-slope, abs=1e-6)
 
 
-def test_determinant_is_positive_over_the_whole_range() -> None:
+def test_determinant_is_positive_over_the_whole_range():
     fine = np.linspace(0.0, STROKE, 2401)
     values = np.array([determinant(*shapes(angle)) for angle in fine])
     assert values.min() > 0.015
@@ -74,7 +72,7 @@ def test_determinant_is_positive_over_the_whole_range() -> None:
 
 
 @pytest.mark.parametrize("muscles", [(1, 1), (2, 5), (3, 7), (7, 3)])
-def test_allocation_inverts_torque_and_stiffness_to_1e_9(muscles: tuple[int, int]) -> None:
+def test_allocation_inverts_torque_and_stiffness_to_1e_9(muscles):
     low_a, high_a = (factor(muscles[0], p) for p in (0.0, 6e5))
     low_b, high_b = (factor(muscles[1], p) for p in (0.0, 6e5))
     for angle, share_a, share_b in itertools.product(ANGLES, *2 * [np.linspace(0.0, 1.0, 9)]):
@@ -87,7 +85,7 @@ def test_allocation_inverts_torque_and_stiffness_to_1e_9(muscles: tuple[int, int
         assert given(*held, angle) == pytest.approx((torque, stiffness), abs=1e-9)
 
 
-def test_torque_comes_first_and_reachable_targets_are_met_within_pressure_limits() -> None:
+def test_torque_comes_first_and_reachable_targets_are_met_within_pressure_limits():
     within = 0
     for torque, stiffness, angle in targets(1500):
         a, b = allocated(torque, stiffness, angle)
@@ -104,7 +102,7 @@ def test_torque_comes_first_and_reachable_targets_are_met_within_pressure_limits
     assert 100 < within < 750
 
 
-def test_no_other_pressures_with_the_torque_are_closer_to_the_stiffness() -> None:
+def test_no_other_pressures_with_the_torque_are_closer_to_the_stiffness():
     """Against a search along the line of equal torque."""
     for torque, stiffness, angle in targets(100):
         a, b = allocated(torque, stiffness, angle)
@@ -118,7 +116,7 @@ def test_no_other_pressures_with_the_torque_are_closer_to_the_stiffness() -> Non
             assert abs(found - stiffness) <= np.abs(offered - stiffness).min() + 1e-9
 
 
-def test_allocation_equals_bounded_least_squares_with_all_weight_on_the_torque() -> None:
+def test_allocation_equals_bounded_least_squares_with_all_weight_on_the_torque():
     for torque, stiffness, angle in targets(200):
         phi_a, phi_b, psi_a, psi_b = shapes(angle)
         weights = np.array([1e4, 1.0])
@@ -137,13 +135,13 @@ def test_allocation_equals_bounded_least_squares_with_all_weight_on_the_torque()
         assert given(*allocated(torque, stiffness, angle), angle) == pytest.approx(best, abs=1e-4)
 
 
-def test_corners_of_the_reachable_set_map_to_corners() -> None:
+def test_corners_of_the_reachable_set_map_to_corners():
     for angle, (a, b) in itertools.product(ANGLES, itertools.product(BOX[:2], BOX[2:])):
         assert allocated(*given(a, b, angle), angle) == pytest.approx((a, b), rel=1e-9)
 
 
 @pytest.mark.parametrize(("share", "areas"), [(0.28, (104.0, 105.9)), (0.33, (137.0, 139.0))])
-def test_area_of_the_reachable_set(share: float, areas: tuple[float, float]) -> None:
+def test_area_of_the_reachable_set(share, areas):
     """At 20 and 60 degrees, with the largest contraction of 28 % and of the printed 33 %."""
     spans = (BOX[1] - BOX[0]) * (BOX[3] - BOX[2])
     for degrees, area in zip((20, 60), areas, strict=True):

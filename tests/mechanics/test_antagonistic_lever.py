@@ -1,7 +1,5 @@
 """Lengths and lever arms of fluidic_muscles, Eq. (1.1): virtual work, symmetry, lengths."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -22,12 +20,12 @@ def written_out(lever: AntagonisticLever, angle: float) -> list[float]:
 
 
 @pytest.mark.parametrize("lever", LEVERS)
-def test_lengths_equal_the_published_equation(lever: AntagonisticLever) -> None:
+def test_lengths_equal_the_published_equation(lever):
     for angle in ANGLES:
         assert lever.length(angle) == pytest.approx(written_out(lever, float(angle)), abs=1e-15)
 
 
-def test_thirty_degrees_need_the_whole_stroke_of_the_muscles() -> None:
+def test_thirty_degrees_need_the_whole_stroke_of_the_muscles():
     short, long = AntagonisticLever().length(math.radians(30.0))
     assert 1e3 * short == pytest.approx(112.5, abs=0.05)
     assert 1e3 * long == pytest.approx(150.0, abs=0.05)
@@ -36,7 +34,7 @@ def test_thirty_degrees_need_the_whole_stroke_of_the_muscles() -> None:
 
 
 @pytest.mark.parametrize("lever", LEVERS)
-def test_rate_and_curve_are_derivatives_of_the_length(lever: AntagonisticLever) -> None:
+def test_rate_and_curve_are_derivatives_of_the_length(lever):
     h = 1e-5
     slope = (lever.length(ANGLES + h) - lever.length(ANGLES - h)) / (2 * h)
     assert np.allclose(slope, lever.rate(ANGLES), atol=1e-10)
@@ -45,19 +43,19 @@ def test_rate_and_curve_are_derivatives_of_the_length(lever: AntagonisticLever) 
 
 
 @pytest.mark.parametrize("lever", LEVERS)
-def test_muscles_are_mirror_images(lever: AntagonisticLever) -> None:
+def test_muscles_are_mirror_images(lever):
     assert np.allclose(lever.length(ANGLES), lever.length(-ANGLES)[:, ::-1], atol=1e-15)
     assert np.allclose(lever.rate(ANGLES), -lever.rate(-ANGLES)[:, ::-1], atol=1e-15)
 
 
 @pytest.mark.parametrize("lever", LEVERS)
-def test_stretched_muscle_has_no_lever_arm_at_the_toggle(lever: AntagonisticLever) -> None:
+def test_stretched_muscle_has_no_lever_arm_at_the_toggle(lever):
     assert float(lever.rate(lever.toggle)[1]) == pytest.approx(0.0, abs=1e-15)
     assert float(lever.rate(0.99 * lever.toggle)[1]) > 0.0
 
 
 @pytest.mark.parametrize("lever", LEVERS)
-def test_lever_kernel_equals_numpy(lever: AntagonisticLever) -> None:
+def test_lever_kernel_equals_numpy(lever):
     known = squares(lever.r_u, lever.r_o, lever.l_u, lever.l_o)
     for angle in ANGLES:
         for k, side in enumerate((1.0, -1.0)):

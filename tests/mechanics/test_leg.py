@@ -1,7 +1,5 @@
 """Leg: balance against numerically differentiated momentum and angular momentum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -27,7 +25,7 @@ def thigh(t: float) -> float:
     return 0.1 + 0.4 * np.cos(2.0 * t + 0.3)
 
 
-def rates(of, t: float) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+def rates(of, t: float) -> tuple[float, float]:
     return (of(t + H) - of(t - H)) / (2 * H), (of(t + H) - 2 * of(t) + of(t - H)) / H**2
 
 
@@ -41,7 +39,7 @@ def centre_at(t: float, leg: Leg) -> np.ndarray:
 
 
 @pytest.mark.parametrize("t", [0.0, 0.4, 1.1, 2.3])
-def test_full_balance_satisfies_newton_and_euler(t: float) -> None:
+def test_full_balance_satisfies_newton_and_euler(t):
     """Knee torque from forces and moments about the shank's centre of mass, all differenced."""
     leg = Leg()
     force = np.array([-80.0, 650.0])
@@ -49,9 +47,7 @@ def test_full_balance_satisfies_newton_and_euler(t: float) -> None:
     knee, centre = knee_at(t, leg), centre_at(t, leg)
     ankle = knee + leg.shank * np.array([-np.sin(lean(t)), -np.cos(lean(t))])
     contact = np.array([ankle[0] + cop, ankle[1] - leg.ankle_height])
-    acceleration = np.array(
-        [rates(lambda s, k=k: centre_at(s, leg)[k], t)[1] for k in range(2)]  # type: ignore[misc]
-    )
+    acceleration = np.array([rates(lambda s, k=k: centre_at(s, leg)[k], t)[1] for k in range(2)])
     joint = leg.mass * (acceleration + np.array([0.0, GRAVITY])) - force
 
     def moment(arm: np.ndarray, f: np.ndarray) -> float:
@@ -68,7 +64,7 @@ def test_full_balance_satisfies_newton_and_euler(t: float) -> None:
     assert made == pytest.approx(expected, abs=1e-4)
 
 
-def test_gravity_stiffness_is_the_slope_of_the_shank_torque() -> None:
+def test_gravity_stiffness_is_the_slope_of_the_shank_torque():
     """Flexing by e leans the shank by e more; the torque of the shank falls by K e."""
     leg, ahead, up = Leg(), 2.0, -1.5
 
@@ -83,7 +79,7 @@ def test_gravity_stiffness_is_the_slope_of_the_shank_torque() -> None:
         assert made == pytest.approx(-slope, abs=1e-6)
 
 
-def test_ground_force_passes_through_one_point_at_every_pace() -> None:
+def test_ground_force_passes_through_one_point_at_every_pace():
     aim, x, z, natural = 1.0, -0.06, 1.0, 0.03
     for quick in (0.25, 0.6, 1.0, 1.2):
         cop = centre_of_pressure(natural, x, z, quick, aim, -0.2, 0.4)
@@ -91,7 +87,7 @@ def test_ground_force_passes_through_one_point_at_every_pace() -> None:
         assert cop + leaning * aim == pytest.approx(natural + x / z * aim, abs=1e-12)
 
 
-def test_centre_of_pressure_stays_within_the_sole() -> None:
+def test_centre_of_pressure_stays_within_the_sole():
     assert centre_of_pressure(0.0, -0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == -0.05
     assert centre_of_pressure(0.2, 0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == 0.2  # driven ahead: as it is
     assert centre_of_pressure(0.3, 0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == 0.22

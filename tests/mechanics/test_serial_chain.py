@@ -1,7 +1,5 @@
 """Serial chain: kernels against numpy, numpy against differences, and energy."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 
@@ -52,7 +50,7 @@ def slope(function: Any, at: np.ndarray) -> np.ndarray:
 # --- numpy --------------------------------------------------------------------------------------
 
 
-def test_pose_of_the_straight_arm_and_of_one_bent_joint() -> None:
+def test_pose_of_the_straight_arm_and_of_one_bent_joint():
     np.testing.assert_allclose(PAPER.pose(np.zeros(6)), [0, 0, 1.5, 0, 0, 1], atol=1e-15)
     bent = np.array([0.3, 0, 0, 0, 0, 0])  # about x: towards -y
     expected = [0, -1.5 * np.sin(0.3), 1.5 * np.cos(0.3), 0, -np.sin(0.3), np.cos(0.3)]
@@ -63,7 +61,7 @@ def test_pose_of_the_straight_arm_and_of_one_bent_joint() -> None:
 
 
 @CHAINS
-def test_batched_poses_equal_single_poses(chain: SerialChain) -> None:
+def test_batched_poses_equal_single_poses(chain):
     angles = np.stack([drawn(chain, seed)[0] for seed in range(4)]).reshape(2, 2, -1)
     assert chain.pose(angles).shape == (2, 2, 6)
     assert chain.joints(angles).shape == (2, 2, chain.stages + 1, 3)
@@ -73,13 +71,13 @@ def test_batched_poses_equal_single_poses(chain: SerialChain) -> None:
 
 
 @CHAINS
-def test_jacobian_is_derivative_of_the_pose(chain: SerialChain) -> None:
+def test_jacobian_is_derivative_of_the_pose(chain):
     angles, _ = drawn(chain)
     np.testing.assert_allclose(chain.jacobian(angles), slope(chain.pose, angles), atol=1e-9)
 
 
 @CHAINS
-def test_kinetic_energy_equals_that_of_the_bodies(chain: SerialChain) -> None:
+def test_kinetic_energy_equals_that_of_the_bodies(chain):
     """Of two mass points and a spin for each link, all differenced."""
     angles, rates = drawn(chain)
     payload, total = 0.7, 0.0
@@ -103,7 +101,7 @@ def test_kinetic_energy_equals_that_of_the_bodies(chain: SerialChain) -> None:
 
 
 @CHAINS
-def test_equations_of_motion_satisfy_lagrange(chain: SerialChain) -> None:
+def test_equations_of_motion_satisfy_lagrange(chain):
     """``d/dt (M v) - d(T - V)/dq`` without acceleration is the bias."""
     angles, rates = drawn(chain)
     payload = 0.4
@@ -118,7 +116,7 @@ def test_equations_of_motion_satisfy_lagrange(chain: SerialChain) -> None:
 
 
 @CHAINS
-def test_batched_weights_equal_single_weights(chain: SerialChain) -> None:
+def test_batched_weights_equal_single_weights(chain):
     poses = np.stack([drawn(chain, seed)[0] for seed in range(6)]).reshape(2, 3, -1)
     masses = np.array([[0.0, 0.1, 0.5], [1.0, 0.2, 0.3]])
     together = chain.gravity_torque(poses, masses)
@@ -134,7 +132,7 @@ def test_batched_weights_equal_single_weights(chain: SerialChain) -> None:
     )
 
 
-def test_hanging_arm_returns_and_horizontal_arm_sags() -> None:
+def test_hanging_arm_returns_and_horizontal_arm_sags():
     bent = np.array([0.2, 0, 0, 0, 0, 0])
     torque = PAPER.gravity_torque(bent)[0]
     weight = 6 * FORM.mass * GRAVITY
@@ -182,7 +180,7 @@ def plain(
 
 
 @CHAINS
-def test_chain_kernels_equal_numpy_kinematics(chain: SerialChain) -> None:
+def test_chain_kernels_equal_numpy_kinematics(chain):
     rows, n = states(chain)[0], chain.stages
     got = plain(place_chain, chain, *states(chain), starts=(0, 0, 0))
     where = [*range(tip_row(n), tip_row(n) + 3), *range(pointing_row(n), pointing_row(n) + 3)]
@@ -190,7 +188,7 @@ def test_chain_kernels_equal_numpy_kinematics(chain: SerialChain) -> None:
 
 
 @CHAINS
-def test_chain_kernels_equal_numpy_dynamics(chain: SerialChain) -> None:
+def test_chain_kernels_equal_numpy_dynamics(chain):
     rows, fixed, work = states(chain)
     n = chain.stages
     got = plain(chain_terms, chain, rows, fixed, work, starts=(0, n, 2 * n, 0, 0))
@@ -209,7 +207,7 @@ def test_chain_kernels_equal_numpy_dynamics(chain: SerialChain) -> None:
 
 
 @CHAINS
-def test_energy_is_conserved_in_free_motion(chain: SerialChain) -> None:
+def test_energy_is_conserved_in_free_motion(chain):
     """Of the kernels' accelerations, integrated by Runge and Kutta's fourth-order method."""
     rows, fixed, work = states(chain, 1)
     n, h, steps = chain.stages, 1e-3, 100
@@ -235,7 +233,7 @@ def test_energy_is_conserved_in_free_motion(chain: SerialChain) -> None:
     assert energy(state) == pytest.approx(before, abs=1e-6 * kinetic)
 
 
-def test_compiled_kernels_give_the_same_bits() -> None:
+def test_compiled_kernels_give_the_same_bits():
     rows, fixed, work = states(PAPER)
     expected = plain(accelerate, PAPER, rows, fixed, work)
     assert np.abs(expected[6:12]).max() > 1.0
@@ -244,7 +242,7 @@ def test_compiled_kernels_give_the_same_bits() -> None:
         np.testing.assert_array_equal(work, expected)
 
 
-def test_lanes_are_independent() -> None:
+def test_lanes_are_independent():
     rows, fixed, work = states(PAPER, 5)
     together = plain(accelerate, PAPER, rows, fixed, work, lanes=5)
     for j in range(5):
@@ -252,7 +250,7 @@ def test_lanes_are_independent() -> None:
         np.testing.assert_array_equal(plain(accelerate, PAPER, *one, lanes=1)[:, 0], together[:, j])
 
 
-def test_row_counts_match_their_declarations() -> None:
+def test_row_counts_match_their_declarations():
     for chain in (PAPER, ODD):
         assert len(chain.rows()) == parameter_rows(chain.stages)
     assert work_rows(6) > max(tip_row(6) + 3, pointing_row(6) + 3)
@@ -272,11 +270,11 @@ def test_row_counts_match_their_declarations() -> None:
         ({"gravity": (0.0, 0.0, 98.0)}, r"gravity\[2\] = 98.0 m/s2"),
     ],
 )
-def test_invalid_chain_is_refused(changes: dict[str, Any], words: str) -> None:
+def test_invalid_chain_is_refused(changes, words):
     with pytest.raises(ValueError, match=words):
         dataclasses.replace(PAPER, **changes)
 
 
-def test_angles_of_wrong_shape_are_refused() -> None:
+def test_angles_of_wrong_shape_are_refused():
     with pytest.raises(ValueError, match="6 joints"):
         PAPER.pose(np.zeros(5))

@@ -1,7 +1,5 @@
 """Static law of the joint's muscles: measured map, inverse, virtual work."""
 
-from __future__ import annotations
-
 import dataclasses
 from importlib import resources
 
@@ -32,7 +30,7 @@ def residuals(law: ForceMap) -> np.ndarray:
     return np.where(MAP["force_n"] > 0.0, value - MAP["force_n"], np.maximum(0.0, value))
 
 
-def test_force_law_fits_the_measured_map() -> None:
+def test_force_law_fits_the_measured_map():
     assert len(MAP) == 85 and MAP["force_n"].max() == pytest.approx(542.5)
     errors = residuals(ForceMap())
     assert np.sqrt(np.mean(errors**2)) < 1.42
@@ -40,7 +38,7 @@ def test_force_law_fits_the_measured_map() -> None:
     assert np.abs(errors[MAP["pressure_pa"] > 1.5e5]).max() < 2.5
 
 
-def test_defaults_are_the_least_squares_fit() -> None:
+def test_defaults_are_the_least_squares_fit():
     defaults = np.array([getattr(ForceMap(), name) for name in FITTED])
 
     def errors(x: np.ndarray) -> np.ndarray:
@@ -52,7 +50,7 @@ def test_defaults_are_the_least_squares_fit() -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_inverse_is_exact(law: ForceMap) -> None:
+def test_inverse_is_exact(law):
     forces = np.linspace(0.0, 400.0, 9)[:, None]
     pressures = law.pressure(forces, CONTRACTIONS)
     assert law.law(pressures, CONTRACTIONS) == pytest.approx(
@@ -61,7 +59,7 @@ def test_inverse_is_exact(law: ForceMap) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_force_rises_with_pressure_and_falls_with_contraction(law: ForceMap) -> None:
+def test_force_rises_with_pressure_and_falls_with_contraction(law):
     pressures = np.linspace(0.0, FULL_PRESSURE, 14)[:, None]
     values = law.law(pressures, CONTRACTIONS)
     assert np.all(np.diff(values, axis=0) > 0.0)
@@ -69,7 +67,7 @@ def test_force_rises_with_pressure_and_falls_with_contraction(law: ForceMap) -> 
     assert np.all(law.force(pressures, CONTRACTIONS) >= 0.0)
 
 
-def test_force_ends_at_the_published_contraction() -> None:
+def test_force_ends_at_the_published_contraction():
     assert ForceMap().longest_contraction() == pytest.approx(0.209, abs=1e-3)
     stretched = ForceMap(stretch=paper_stretch())
     assert stretched.longest_contraction() == pytest.approx(0.25, abs=1e-9)
@@ -77,7 +75,7 @@ def test_force_ends_at_the_published_contraction() -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_volume_satisfies_virtual_work(law: ForceMap) -> None:
+def test_volume_satisfies_virtual_work(law):
     """The share of the force that is proportional to the pressure is -dV/dL."""
     h = 1e-6
     numbers = (law.area, law.taper, 1.0 / law.stretch, 0.25 * np.pi * law.diameter**2)
@@ -87,7 +85,7 @@ def test_volume_satisfies_virtual_work(law: ForceMap) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_force_map_kernel_equals_numpy(law: ForceMap) -> None:
+def test_force_map_kernel_equals_numpy(law):
     numbers = (law.area, law.taper, law.threshold, law.braid_force, law.braid_strain, law.stiffness)
     for x in CONTRACTIONS:
         area, passive, less, more = force_terms(float(x), *numbers, 1.0 / law.stretch)

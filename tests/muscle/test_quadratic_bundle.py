@@ -1,7 +1,5 @@
 """Quadratic law of a bundle: published points, signs, virtual work, volume."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -26,19 +24,19 @@ def printed(muscles: float) -> QuadraticBundle:
     return dataclasses.replace(bundle(muscles), pressure_base=-0.021, largest_contraction=0.33)
 
 
-def test_factors_equal_equation_6_as_read() -> None:
+def test_factors_equal_equation_6_as_read():
     for n in NUMBERS:
         assert bundle(n).passive_factor == pytest.approx(-39.0 + 321.0 * n)
         assert 1e3 * bundle(n).pressure_factor == pytest.approx(-0.21 + 4.41 * n)
 
 
-def test_k1_as_printed_gives_negative_force_for_up_to_four_muscles() -> None:
+def test_k1_as_printed_gives_negative_force_for_up_to_four_muscles():
     forces = [float(printed(n).law(4e5, 0.0)) for n in NUMBERS]
     assert forces[:4] == pytest.approx([-319.0, -214.0, -110.0, -5.0], abs=0.5)
     assert min(forces[4:]) > 0.0
 
 
-def test_force_grows_with_the_number_of_muscles() -> None:
+def test_force_grows_with_the_number_of_muscles():
     """REPRODUCTION's values with 33 % of largest contraction; linear, as the paper says."""
     read = [float(dataclasses.replace(bundle(n), largest_contraction=0.33).law(4e5, 0.0))
             for n in NUMBERS]  # fmt: skip
@@ -46,7 +44,7 @@ def test_force_grows_with_the_number_of_muscles() -> None:
     assert np.diff(read, 2) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_filling_lowers_the_force_beyond_28_percent_contraction() -> None:
+def test_filling_lowers_the_force_beyond_28_percent_contraction():
     """The change of force by filling to 500 kPa, at the contractions of Fig. 2."""
     muscle = bundle(1.0)
     contraction = 0.39 * np.array([0.08, 0.13, 0.19, 0.24, 0.28, 0.32])
@@ -62,7 +60,7 @@ def test_filling_lowers_the_force_beyond_28_percent_contraction() -> None:
 
 
 @pytest.mark.parametrize("muscles", NUMBERS)
-def test_stiffness_is_the_slope_of_the_force(muscles: float) -> None:
+def test_stiffness_is_the_slope_of_the_force(muscles):
     made, h = bundle(muscles), 1e-5
     c = np.linspace(0.0, 0.12, 13)
     slope = (made.law(3e5, c + h) - made.law(3e5, c - h)) / (2.0 * h)
@@ -70,7 +68,7 @@ def test_stiffness_is_the_slope_of_the_force(muscles: float) -> None:
 
 
 @pytest.mark.parametrize("muscles", NUMBERS)
-def test_bundle_volume_satisfies_virtual_work(muscles: float) -> None:
+def test_bundle_volume_satisfies_virtual_work(muscles):
     """dV/dC is the force over the pressure, less the force of the empty muscle."""
     made, h = bundle(muscles), 1e-5
     c = np.linspace(0.0, 0.12, 13)
@@ -78,7 +76,7 @@ def test_bundle_volume_satisfies_virtual_work(muscles: float) -> None:
     assert 2e5 * rise == pytest.approx(made.law(2e5, c) - made.law(0.0, c), rel=1e-6, abs=1e-6)
 
 
-def test_volume_is_near_that_of_an_ideal_braid() -> None:
+def test_volume_is_near_that_of_an_ideal_braid():
     """Threads of constant length on a cylinder: the fit deviates by a few per cent."""
     made = dataclasses.replace(bundle(1.0), line_volume=0.0)
     cosine = np.sqrt(1.0 / 3.0) / (1.0 - made.largest_contraction)
@@ -89,12 +87,12 @@ def test_volume_is_near_that_of_an_ideal_braid() -> None:
     assert made.volume(c) == pytest.approx(ideal, rel=0.04)
 
 
-def test_inverse_in_pressure_is_exact() -> None:
+def test_inverse_in_pressure_is_exact():
     made, p = bundle(3.0), np.linspace(0.0, 6e5, 7)
     assert made.pressure(made.factor(p)) == pytest.approx(p, abs=1e-6)
 
 
-def test_bundle_kernels_equal_numpy() -> None:
+def test_bundle_kernels_equal_numpy():
     made = bundle(4.0)
     for c in (0.0, 0.03, 0.11):
         shape, slope = bundle_shape(c, made.nominal_length, made.reach)

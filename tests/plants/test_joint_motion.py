@@ -66,7 +66,7 @@ def integrated(
 @pytest.mark.parametrize("payload, shove", [(0.0, 0.0), (0.4, -0.7)])
 def test_the_joint_follows_its_differential_equation(payload: float, shove: float) -> None:
     commands = steps(60, 22.0 * DEGREE)
-    plant = AntagonisticJoint.paper("none")
+    plant = AntagonisticJoint.paper("none").with_lag_alone()
     made = simulate_joint(plant, commands, payload=payload, disturbance=shove)["angle"]
     exact = integrated(plant, commands, payload, shove)
     assert np.abs(made - exact).max() < 0.02 * DEGREE
@@ -110,7 +110,7 @@ def double_pole(response: np.ndarray) -> float:
 )
 def test_the_nominal_dynamics_are_two_poles_near_23(start: float, end: float) -> None:
     """Without hysteresis and gravity, over the whole range: within 3 rad/s, to 2 % of the step."""
-    plant = AntagonisticJoint.paper("none", link__gravity=0.0)
+    plant = AntagonisticJoint.paper("none", link__gravity=0.0).with_lag_alone()
     commands = DEGREE * np.array([start] * 2 + [end] * 60)
     angles = simulate_joint(plant, commands)["angle"][1:]
     response = (angles - angles[0]) / (commands[-1] - commands[0])
@@ -134,7 +134,7 @@ def test_reduced_plant_is_near_the_plant_with_muscles(kind) -> None:  # type: ig
     t = PERIOD * np.arange(600)
     still = {"link__gravity": 0.0}
     whole, reduced, plain = (
-        AntagonisticJoint.paper(kind, **still),
+        AntagonisticJoint.paper(kind, **still).with_lag_alone(),
         AntagonisticJoint.reduced(kind, **still),
         AntagonisticJoint.reduced("none", **still),
     )

@@ -64,7 +64,7 @@ def test_branch_after_a_turn_is_flatter_than_the_branch_of_loading() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_small_step_of_the_knee_follows_the_linear_model(kind: str) -> None:
-    plant, size = KneeOrthosis.no_load(kind), 1e3
+    plant, size = KneeOrthosis.no_load(kind).with_lag_alone(), 1e3
     steps = np.array([2e5] * REST + [2e5 + size] * AFTER)
     found = simulate_knee(plant, steps, pressure=2e5)["angle"]
     near(
@@ -95,7 +95,7 @@ def test_joint_has_real_poles_near_23_per_second() -> None:
 
 
 def test_small_step_of_the_joint_follows_the_linear_model() -> None:
-    plant, size = AntagonisticJoint.paper("none"), 0.002
+    plant, size = AntagonisticJoint.paper("none").with_lag_alone(), 0.002
     model = plant.linearise(angle=0.1, inputs="angle")
     start = 0.1 + float(plant.gravity_shift(np.array([0.1]))[0])
     found = simulate_joint(plant, np.array([start] * REST + [start + size] * AFTER))["angle"]
@@ -103,7 +103,7 @@ def test_small_step_of_the_joint_follows_the_linear_model() -> None:
 
 
 def test_small_step_of_the_elbow_follows_the_linear_model() -> None:
-    plant, size = ElbowOrthosis.paper("none"), 500.0
+    plant, size = ElbowOrthosis.paper("none").with_lag_alone(), 500.0
     angle = float(plant.pulley.middle)
     low, high = [(2e5, 2e5)] * REST, [(2e5, 2e5 + size)] * AFTER
     found = simulate_elbow(plant, np.array(low + high), intent=angle)["angle"]

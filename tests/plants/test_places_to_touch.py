@@ -11,15 +11,15 @@ from pathlib import Path
 import pam_envs
 
 ROWS = """
-from pam_envs.plants.core.muscle_path import PATH_STATE
+from pam_envs.plants.core.muscle_path import DELAYED, PATH_STATE
 from pam_envs.plants.core.rows import dotted, each, layout, path_effects
 from pam_envs.plants.core.sensors import sensor_rows
 
 globals().update(
     layout(
-        each("pressure set_point force"),
+        each("pressure set_point force") | {"delay": DELAYED.end},
         dotted(
-            regulator="max_pressure time_constant slew_rate",
+            regulator="max_pressure dead_time time_constant slew_rate",
             muscle="area",
             pressure="noise resolution bias",
         ),
@@ -53,12 +53,11 @@ ROLLOUT = """
 from isometric import rows as K
 from pam_envs.hysteresis import protocol
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.plants.core.muscle_path import begin_path, path_step
+from pam_envs.plants.core.muscle_path import begin_delay, begin_path, follow_set_point, path_step
 from pam_envs.plants.core.rollout import loop_for, simulate_plants
 from pam_envs.plants.core.rows import signal_rows
-from pam_envs.plants.core.sensors import effect_kernels, read_sensors
+from pam_envs.plants.core.sensors import begin_sensors, effect_kernels, read_sensors
 from pam_envs.plants.core.rollout import drives_of
-from pam_envs.pneumatics.regulator import regulator_step
 
 OUTPUTS = signal_rows(K, "pressure force")
 EFFECTS_AT, EFFECTIVE = 0, K.PRESSURE
@@ -71,20 +70,18 @@ def drive(rows, fixed, drives, t, column, j):
 
 @kernel
 def regulate(rows, fixed, counts, i, substeps, period, work):
-    for j in range(LANES):
-        time, slew = fixed[K.REGULATOR_TIME_CONSTANT][j], fixed[K.REGULATOR_SLEW_RATE][j]
-        rows[K.PRESSURE][j] = regulator_step(
-            rows[K.PRESSURE][j], rows[K.SET_POINT][j], time, 1.0 / time, slew, 1.0 / slew,
-            period / substeps,
-        )
+    follow_set_point(
+        rows, fixed, K.DELAY, K.REGULATOR_MAX_PRESSURE, rows[K.PRESSURE], rows[K.SET_POINT],
+        counts[K.STEP], i, substeps, period,
+    )
 
 
 @kernel
 def regulate_extended(rows, fixed, counts, i, substeps, period, work):
     path_step(
-        rows, fixed, EFFECTS_AT + K.STATE.path, K.EFFECT.path, K.REGULATOR_MAX_PRESSURE,
-        K.EFFECT.warm, rows[K.PRESSURE], rows[K.SET_POINT], rows[EFFECTIVE], work[0],
-        counts[K.STEP], i, substeps, period,
+        rows, fixed, EFFECTS_AT + K.STATE.path, K.EFFECT.path, K.DELAY,
+        K.REGULATOR_MAX_PRESSURE, K.EFFECT.warm, rows[K.PRESSURE], rows[K.SET_POINT],
+        rows[EFFECTIVE], work[0], counts[K.STEP], i, substeps, period,
     )
 
 
@@ -104,8 +101,9 @@ def begin_muscle_extended(rows, fixed, j):
 def begin(rows, fixed, counts, table, extra, drives, t, first, elements, work):
     for j in range(LANES):
         rows[K.PRESSURE][j] = 0.0
+        begin_delay(rows, j, K.DELAY, 0.0)
         begin_muscle(rows, fixed, j)
-        read_sensors(rows, fixed, j, 0, 0.0)
+        begin_sensors(rows, fixed, j)
 
 
 @kernel
@@ -114,7 +112,7 @@ def advance(rows, fixed, counts, table, hysteresis, elements, substeps, period, 
         regulate(rows, fixed, counts, i, substeps, period, work)
     for j in range(LANES):
         rows[K.FORCE][j] = fixed[K.MUSCLE_AREA][j] * rows[EFFECTIVE][j]
-        read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
+    read_sensors(rows, fixed, counts[K.STEP], period)
 
 
 def replacements(effects):
@@ -169,7 +167,7 @@ from isometric.plant import Isometric
 from isometric.rollout import simulate
 from pam_envs.plants.core.replay import Stepper, replay_plant
 
-plant = Isometric().replace({"regulator.time_constant": 0.05, "regulator.slew_rate": 1e9})
+plant = Isometric().replace({"regulator.time_constant": 0.05}).with_lag_alone()
 made = simulate(plant, np.full(40, 2e5))
 assert made["pressure"][4] == pytest.approx(2e5 * (1.0 - math.exp(-1.0)))
 assert np.allclose(made["force"], plant.muscle.area * made["pressure"])
@@ -265,8 +263,9 @@ def test_effect_is_added_in_the_file_of_its_component(tmp_path: Path) -> None:
         ('        ("bow",),\n', '        ("bow",),\n        ("cube",),\n'),
         ("    bow: float", '    cube: float = effect("1", -1.0, 1.0, "a toy")\n    bow: float'),
         (
-            "        x\n        + ",
-            "        x\n        + cubic(x, full, fixed[effects + SENSOR.cube][j])\n        + ",
+            "        shown[j] = value[j]\n",
+            "        share = fixed[effects + SENSOR.cube][j]\n"
+            "        shown[j] = value[j] + cubic(value[j], full[j], share)\n",
         ),
     ):
         assert text.count(old) == 1, old

@@ -52,9 +52,9 @@ def elbow(plant: ElbowOrthosis, pressure: Any) -> Signals:
 
 PLANTS: dict[str, tuple[Any, Callable[..., Signals]]] = {
     "single_muscle": (SingleMuscle.mas10("none").replace({"regulator.dead_time": 0.0}), muscle),
-    "knee_orthosis": (KneeOrthosis.no_load("none"), knee),
-    "antagonistic_joint": (AntagonisticJoint.paper("none"), joint),
-    "elbow_orthosis": (ElbowOrthosis.paper("none"), elbow),
+    "knee_orthosis": (KneeOrthosis.no_load("none").with_lag_alone(), knee),
+    "antagonistic_joint": (AntagonisticJoint.paper("none").with_lag_alone(), joint),
+    "elbow_orthosis": (ElbowOrthosis.paper("none").with_lag_alone(), elbow),
 }
 ALL = {name: plant for name, (plant, _) in PLANTS.items()}
 ALL["redundant_manipulator"] = RedundantManipulator.paper("none")

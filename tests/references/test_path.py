@@ -1,7 +1,5 @@
 """Paths of a tool: ends, draws, and the law of time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,7 @@ from pam_envs.references.path import PATHS, POINTS, along, draw_ends, joint_line
 LIMIT = np.deg2rad(30.0)
 
 
-def test_presets_are_lines_of_six_joints_within_their_limits() -> None:
+def test_presets_are_lines_of_six_joints_within_their_limits():
     assert [path.name for path in PATHS] == ["path_1", "path_2", "path_3"]
     assert [path.calibrated for path in PATHS] == [True, True, False]
     for path in PATHS:
@@ -21,7 +19,7 @@ def test_presets_are_lines_of_six_joints_within_their_limits() -> None:
         np.testing.assert_allclose(np.rad2deg(angles[-1]), path.end_degrees, atol=1e-12)
 
 
-def test_line_has_equal_steps() -> None:
+def test_line_has_equal_steps():
     line = joint_line([0.1, -0.2], [0.4, 0.2], 5)
     np.testing.assert_allclose(np.diff(line, axis=0), [[0.075, 0.1]] * 4, atol=1e-15)
 
@@ -30,12 +28,12 @@ def test_line_has_equal_steps() -> None:
     ("start", "end", "points", "words"),
     [([0.1, 0.2], [0.1], 5, "do not fit"), ([0.1], [0.2], 1, "too few"), (0.1, 0.2, 5, "shapes")],
 )
-def test_invalid_line_is_refused(start: object, end: object, points: int, words: str) -> None:
+def test_invalid_line_is_refused(start, end, points, words):
     with pytest.raises(ValueError, match=words):
-        joint_line(start, end, points)  # type: ignore[arg-type]
+        joint_line(start, end, points)
 
 
-def test_drawn_paths_depend_on_the_seed_alone() -> None:
+def test_drawn_paths_depend_on_the_seed_alone():
     starts, ends = draw_ends(3, 8, 6, LIMIT)
     fewer = draw_ends(3, 5, 6, LIMIT)
     np.testing.assert_array_equal(fewer[0], starts[:5])
@@ -45,7 +43,7 @@ def test_drawn_paths_depend_on_the_seed_alone() -> None:
 
 
 @pytest.mark.parametrize("stages", [5, 6, 8])
-def test_drawn_paths_keep_limits_and_avoid_the_straight_arm(stages: int) -> None:
+def test_drawn_paths_keep_limits_and_avoid_the_straight_arm(stages):
     starts, ends = draw_ends(0, 60, stages, LIMIT)
     assert max(np.abs(starts).max(), np.abs(ends).max()) < 0.9 * LIMIT
     assert max(np.abs(starts).max(), np.abs(ends).max()) > 0.8 * LIMIT
@@ -54,7 +52,7 @@ def test_drawn_paths_keep_limits_and_avoid_the_straight_arm(stages: int) -> None
         assert np.linalg.norm(joint_line(start, end), axis=1).min() > 0.6 * LIMIT
 
 
-def test_motion_along_a_path_begins_and_ends_smoothly() -> None:
+def test_motion_along_a_path_begins_and_ends_smoothly():
     h = 1e-3
     share = np.arange(0.0, 1.0 + h / 2, h)
     way = np.array([least_jerk(u) for u in share.tolist()])
@@ -67,7 +65,7 @@ def test_motion_along_a_path_begins_and_ends_smoothly() -> None:
     assert (least_jerk(-0.5), least_jerk(1.5)) == (0.0, 1.0)
 
 
-def test_tool_rests_moves_rests_and_returns() -> None:
+def test_tool_rests_moves_rests_and_returns():
     rest, move = 0.5, 2.0
     at = [along(t, rest, move) for t in (0.0, 0.5, 1.5, 2.5, 3.0, 4.0, 5.0, 5.25, 6.5)]
     np.testing.assert_allclose(at, [0.0, 0.0, 0.5, 1.0, 1.0, 0.5, 0.0, 0.0, 0.5], atol=1e-12)

@@ -1,7 +1,5 @@
 """Intended motions: smooth, within their range, the same from the same key."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -39,7 +37,7 @@ def course(rows: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", [REACHES, SINES, STILL])
-def test_motions_stay_in_their_range_and_begin_at_rest(kind: int) -> None:
+def test_motions_stay_in_their_range_and_begin_at_rest(kind):
     times = np.arange(0.0, 20.0, 0.05)
     for seed in range(5):
         angle, rate, _ = course(drawn(seed, kind), times)
@@ -49,14 +47,14 @@ def test_motions_stay_in_their_range_and_begin_at_rest(kind: int) -> None:
 
 
 @pytest.mark.parametrize("kind", [REACHES, SINES])
-def test_rate_and_acceleration_are_derivatives(kind: int) -> None:
+def test_rate_and_acceleration_are_derivatives(kind):
     h, times = 1e-5, np.arange(0.1, 12.0, 0.013)
     rows = drawn(3, kind)
     slopes = (course(rows, times + h) - course(rows, times - h)) / (2.0 * h)
     assert np.allclose(slopes[:2], course(rows, times)[1:], atol=1e-4)
 
 
-def test_reaches_join_and_rest_between() -> None:
+def test_reaches_join_and_rest_between():
     rows = drawn(1, REACHES)
     for window in range(1, 6):
         before, after = (at(rows, 0, 0, SECONDS * window + d) for d in (-1e-9, 1e-9))
@@ -64,7 +62,7 @@ def test_reaches_join_and_rest_between() -> None:
         assert before[1] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_reach_has_minimum_jerk() -> None:
+def test_reach_has_minimum_jerk():
     """Fifth order, symmetric, with neither speed nor acceleration at its ends."""
     u = np.linspace(0.0, 1.0, 41)
     s = np.array([least_jerk(float(x)) for x in u])
@@ -80,7 +78,7 @@ def test_reach_has_minimum_jerk() -> None:
     assert np.allclose(bend[1:-1], (v[2:] - v[:-2]) * 20.0, atol=0.05)
 
 
-def test_mixed_motions_draw_each_kind_and_depend_on_the_key() -> None:
+def test_mixed_motions_draw_each_kind_and_depend_on_the_key():
     kinds = {int(drawn(seed, MIXED)[KIND, 0]) for seed in range(40)}
     assert kinds == set(range(len(MOTIONS) - 1))
     times = np.arange(0.0, 8.0, 0.1)

@@ -1,7 +1,5 @@
 """References: seeded, within range, with exact previews."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -22,7 +20,7 @@ def record(seed: int, seconds: float = 12.0, **arguments: object) -> np.ndarray:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_family_is_seeded_and_stays_in_range(family: str) -> None:
+def test_family_is_seeded_and_stays_in_range(family):
     several = [record(seed, reference=family) for seed in range(4)]
     assert np.array_equal(several[0], record(0, reference=family))
     assert len({r.tobytes() for r in several}) == 4
@@ -32,7 +30,7 @@ def test_family_is_seeded_and_stays_in_range(family: str) -> None:
         assert np.ptp(r) > 0.001
 
 
-def test_each_family_has_its_characteristic_shape() -> None:
+def test_each_family_has_its_characteristic_shape():
     steps, ramps = record(0, reference="steps"), record(0, reference="ramps")
     assert np.mean(np.diff(steps) == 0.0) > 0.98
     assert np.abs(np.diff(ramps)).max() < 0.012 * 0.01 + 1e-9  # at most the range in a second
@@ -53,7 +51,7 @@ def test_each_family_has_its_characteristic_shape() -> None:
 
 
 @pytest.mark.parametrize(("preview", "stride"), [(5, 4), (1, 1), (20, 3), (3, 50)])
-def test_preview_equals_the_future_reference(preview: int, stride: int) -> None:
+def test_preview_equals_the_future_reference(preview, stride):
     env = gym.make(NAME, preview=preview, preview_stride=stride, reference="mixed", normalize=False)
     observation, info = env.reset(seed=5)
     seen, previews = [info["reference"]], [observation[4:]]
@@ -67,7 +65,7 @@ def test_preview_equals_the_future_reference(preview: int, stride: int) -> None:
                 assert value == np.float32(seen[k + i * stride])
 
 
-def test_given_samples_are_followed_and_the_last_is_held() -> None:
+def test_given_samples_are_followed_and_the_last_is_held():
     samples = 0.005 + 0.002 * np.sin(0.05 * np.arange(200))
     env = gym.make(NAME, reference=samples, preview=2, preview_stride=10, normalize=False)
     observation, info = env.reset(seed=0)

@@ -1,7 +1,5 @@
 """A scheduler and workers as processes of this machine, started as a user starts them."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Kill of programs, and their child processes."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

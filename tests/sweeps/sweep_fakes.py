@@ -1,7 +1,5 @@
 """Tasks that succeed, fail or kill their workers."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

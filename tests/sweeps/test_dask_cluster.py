@@ -1,11 +1,8 @@
 """Tasks on a Dask cluster with killed workers, schedulers and drivers."""
 
-from __future__ import annotations
-
 import signal
 import sys
 import threading
-from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import pytest
@@ -25,7 +22,7 @@ def on(dask: DaskProcesses) -> Cluster:
     return Cluster(backend="dask", address=dask.address)
 
 
-def test_results_are_those_of_one_process(dask: DaskProcesses, tmp_path: Path) -> None:
+def test_results_are_those_of_one_process(dask, tmp_path):
     kinds = {2: "wrong", 4: "foreign"}
     tasks = [Number(k, kinds.get(k, ""), str(tmp_path)) for k in range(8)]
     done = {d.key: d for d in run(square, tasks, on(dask))}
@@ -36,14 +33,14 @@ def test_results_are_those_of_one_process(dask: DaskProcesses, tmp_path: Path) -
         assert done[str(k)] == Done(str(k), k * k)
 
 
-def test_killed_worker_loses_no_result(dask: DaskProcesses, tmp_path: Path) -> None:
+def test_killed_worker_loses_no_result(dask, tmp_path):
     tasks = [Number(k, "deadly once" if k == 1 else "slow", str(tmp_path)) for k in range(8)]
     done = list(run(square, tasks, on(dask)))
     assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(8)]
     assert tasks[1].begins() == 2
 
 
-def test_value_lost_with_its_worker_is_recomputed(dask: DaskProcesses, tmp_path: Path) -> None:
+def test_value_lost_with_its_worker_is_recomputed(dask, tmp_path):
     tasks = [
         Number(k, "dies with its value" if k % 3 == 1 else "", str(tmp_path)) for k in range(6)
     ]
@@ -51,9 +48,7 @@ def test_value_lost_with_its_worker_is_recomputed(dask: DaskProcesses, tmp_path:
     assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(6)]
 
 
-def test_task_that_kills_its_workers_is_named_and_others_finish(
-    dask: DaskProcesses, tmp_path: Path
-) -> None:
+def test_task_that_kills_its_workers_is_named_and_others_finish(dask, tmp_path):
     tasks = [Number(k, "deadly" if k == 1 else "", str(tmp_path)) for k in range(5)]
     done = {d.key: d for d in run(square, tasks, on(dask))}
     assert "its worker died again and again" in done.pop("1").error
@@ -65,9 +60,7 @@ def test_task_that_kills_its_workers_is_named_and_others_finish(
     ]
 
 
-def test_worker_without_the_code_names_the_remedy(
-    dask: DaskProcesses, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_worker_without_the_code_names_the_remedy(dask, tmp_path, monkeypatch):
     elsewhere = ModuleType("only_here")
     exec("def act(task): return task.number", vars(elsewhere))
     monkeypatch.setitem(sys.modules, "only_here", elsewhere)
@@ -88,7 +81,7 @@ for done in run(square, tasks, Cluster(backend="dask", address=address)):
 """
 
 
-def test_tasks_of_a_killed_driver_stop(dask: DaskProcesses, tmp_path: Path) -> None:
+def test_tasks_of_a_killed_driver_stop(dask, tmp_path):
     family = new_family()
     driver = start(family, "-c", PROGRAM, str(tmp_path), "endless", dask.address)
     wait_until(lambda: len(list(tmp_path.glob("begun_*"))) == 2)
@@ -101,9 +94,7 @@ def test_tasks_of_a_killed_driver_stop(dask: DaskProcesses, tmp_path: Path) -> N
     assert len(list(tmp_path.glob("begun_*"))) == 2 + len(after)
 
 
-def test_missing_workers_are_reported_and_awaited(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_workers_are_reported_and_awaited(tmp_path, monkeypatch):
     monkeypatch.setattr("sweeps.dask_cluster.LOOK", 0.1)
     said: list[str] = []  # two threads look at it
     monkeypatch.setattr(sys, "stderr", SimpleNamespace(write=said.append, flush=lambda: None))
@@ -131,13 +122,13 @@ def test_missing_workers_are_reported_and_awaited(
         assert sorted(d.value for d in done) == [k * k for k in range(8)]
 
 
-def test_missing_scheduler_raises_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_scheduler_raises_an_error(monkeypatch):
     monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 1.0)
     with pytest.raises(ValueError, match=r"no Dask scheduler answers at .tcp://127\.0\.0\.1:9."):
         list(run(square, [Number(1)], Cluster(backend="dask", address="tcp://127.0.0.1:9")))
 
 
-def test_lost_scheduler_raises_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lost_scheduler_raises_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 6.0)
     with DaskProcesses(tmp_path, workers=1) as dask:
         tasks = [Number(k, "slow", str(tmp_path)) for k in range(100)]

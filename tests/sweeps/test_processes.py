@@ -1,10 +1,7 @@
 """Tasks on processes of this machine: results, lost workers, killed drivers."""
 
-from __future__ import annotations
-
 import signal
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -20,7 +17,7 @@ TWO = Cluster(jobs=2)
 
 
 @pytest.fixture(autouse=True)
-def fresh_pool() -> Iterator[None]:
+def fresh_pool():
     """Start with new workers, and end them afterwards."""
     get_reusable_executor().shutdown(wait=True)
     yield
@@ -32,7 +29,7 @@ def numbers(folder: Path, count: int, **kinds: str) -> list[Number]:
     return [Number(k, kinds.get(f"n{k}", ""), str(folder)) for k in range(count)]
 
 
-def test_results_are_those_of_one_process(tmp_path: Path) -> None:
+def test_results_are_those_of_one_process(tmp_path):
     tasks = numbers(tmp_path, 7, n2="wrong")
     here = list(run(square, tasks, Cluster()))
     assert [done.key for done in here] == list("0123456")
@@ -43,13 +40,13 @@ def test_results_are_those_of_one_process(tmp_path: Path) -> None:
     assert [task.begins() for task in tasks] == [2] * 7  # an error is no reason to try again
 
 
-def test_killed_worker_loses_no_result(tmp_path: Path) -> None:
+def test_killed_worker_loses_no_result(tmp_path):
     tasks = numbers(tmp_path, 10, n3="deadly once", n7="deadly once")
     done = list(run(square, tasks, TWO))
     assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(10)]
 
 
-def test_task_that_kills_its_workers_is_named_and_others_finish(tmp_path: Path) -> None:
+def test_task_that_kills_its_workers_is_named_and_others_finish(tmp_path):
     tasks = numbers(tmp_path, 6, n1="deadly")
     done = {d.key: d for d in run(square, tasks, TWO)}
     assert len(done) == 6
@@ -61,7 +58,7 @@ def test_task_that_kills_its_workers_is_named_and_others_finish(tmp_path: Path) 
             assert done[task.key] == Done(task.key, task.number**2)
 
 
-def test_worker_with_other_sources_refuses_the_task(tmp_path: Path) -> None:
+def test_worker_with_other_sources_refuses_the_task(tmp_path):
     tasks = [Number(1, "foreign", str(tmp_path)), Number(2, "", str(tmp_path))]
     foreign, ours = sorted(run(square, tasks, TWO), key=lambda done: done.error is None)
     assert "other sources, package versions" in foreign.error
@@ -78,14 +75,12 @@ def test_worker_with_other_sources_refuses_the_task(tmp_path: Path) -> None:
         ({"jobs": 0}, "jobs = 0 is below 1"),
     ],
 )
-def test_contradictory_arguments_are_refused(given: dict[str, object], said: str) -> None:
+def test_contradictory_arguments_are_refused(given, said):
     with pytest.raises(ValueError, match=said):
         Cluster(**given)
 
 
-def test_a_process_with_threads_does_one_task_at_a_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_process_with_threads_does_one_task_at_a_time(tmp_path, monkeypatch):
     inside, most = [], []
 
     def act(task: Number) -> None:
@@ -116,7 +111,7 @@ for done in run(square, tasks, Cluster(jobs=2)):
 
 
 @pytest.mark.parametrize("moment", ["it begins", "the workers start", "tasks are done"])
-def test_killed_driver_leaves_no_process(moment: str, tmp_path: Path) -> None:
+def test_killed_driver_leaves_no_process(moment, tmp_path):
     family = new_family()
     driver = start(family, "-c", PROGRAM, str(tmp_path))
     begun = {

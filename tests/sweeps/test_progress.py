@@ -1,24 +1,21 @@
 """Progress on terminals and in files."""
 
-from __future__ import annotations
-
 import io
 
-import pytest
 from rich.console import Console
 
 from sweeps import progress as bars
 from sweeps.progress import left, progress
 
 
-def test_remaining_time_assumes_the_mean_rate() -> None:
+def test_remaining_time_assumes_the_mean_rate():
     assert left(60.0, 2, 10) == "about 0:04:00"
     assert left(3600.0, 1, 30) == "about 29:00:00"
     assert left(5.0, 4, 4) == "about 0:00:00"
     assert left(5.0, 0, 4) == left(None, 1, 4) == left(5.0, 1, None) == "?"
 
 
-def test_terminal_shows_a_bar() -> None:
+def test_terminal_shows_a_bar():
     text = io.StringIO()
     console = Console(file=text, force_terminal=True, width=100)
     with progress("cells", console) as start:
@@ -29,7 +26,7 @@ def test_terminal_shows_a_bar() -> None:
     assert "about 0:00:00" in text.getvalue()
 
 
-def test_file_gets_one_line_per_minute(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_file_gets_one_line_per_minute(monkeypatch):
     now = iter([0.0, 30.0, 70.0, 100.0, 101.0])
     monkeypatch.setattr(bars.time, "monotonic", lambda: next(now))
     text = io.StringIO()

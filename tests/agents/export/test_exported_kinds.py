@@ -1,7 +1,5 @@
 """Exported policies of every kind: recurrent, with history, with controller."""
 
-from __future__ import annotations
-
 import dataclasses
 import subprocess
 import sys
@@ -28,7 +26,6 @@ from baselines.core.catalogue import make_controller
 Run = Callable[[str], tuple[Any, Path]]
 REMEMBERS = ("recurrent", "plain_recurrent", "history", "residual_sac", "residual_recurrent")
 CORRECTS = ("residual", "residual_sac", "residual_recurrent")
-PLAIN = ("ppo", "sac", "tqc")
 ROOT = Path(__file__).resolve().parents[3]
 
 
@@ -65,9 +62,7 @@ def seen_and_done(name: str, model: Any, steps: int) -> Iterator[tuple[Any, Any,
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_exported_actions_equal_those_of_torch_over_whole_episodes(
-    name: str, short_run: Run
-) -> None:
+def test_exported_actions_equal_those_of_torch_over_whole_episodes(name, short_run):
     model, folder = short_run(name)
     file = OnnxPolicy.load(folder / "policy.onnx")
     policies: list[Any] = []
@@ -87,7 +82,7 @@ def test_exported_actions_equal_those_of_torch_over_whole_episodes(
 
 
 @pytest.mark.parametrize("name", REMEMBERS)
-def test_state_is_explicit_and_reset_at_episode_start(name: str, short_run: Run) -> None:
+def test_state_is_explicit_and_reset_at_episode_start(name, short_run):
     file = OnnxPolicy.load(short_run(name)[1] / "policy.onnx")
     given = np.zeros((4, 1), np.float32) if file.corrects else None
     seen = np.random.default_rng(2).uniform(-1, 1, (6, 4, len(file.signals))).astype(np.float32)
@@ -106,33 +101,29 @@ def test_state_is_explicit_and_reset_at_episode_start(name: str, short_run: Run)
         file.answer(seen[5], state[:3], None, given)
 
 
-@pytest.mark.parametrize("name", REMEMBERS)
-def test_row_with_state_is_independent_of_its_batch(name: str, short_run: Run) -> None:
+@pytest.mark.parametrize("name", KINDS)
+def test_row_with_its_state_is_independent_of_its_batch(name, short_run):
     file = OnnxPolicy.load(short_run(name)[1] / "policy.onnx")
+    assert bool(file.memory) == (name in REMEMBERS)
     rng = np.random.default_rng(4)
-    seen = rng.uniform(-1, 1, (65, len(file.signals))).astype(np.float32)
-    state = rng.uniform(-1, 1, (65, file.memory)).astype(np.float32)
-    given = rng.uniform(-1, 1, (65, 1)).astype(np.float32) if file.corrects else None
-    whole, after = file.answer(seen, state, None, given)
+
+    def drawn(width: int) -> Any:
+        return rng.uniform(-1, 1, (65, width)).astype(np.float32) if width else None
+
+    given = [drawn(len(file.signals)), drawn(file.memory), None, drawn(int(bool(file.corrects)))]
+    whole = file.answer(*given)
     for size in (1, 2, 3, 64):
         for at in range(0, 65, size):
             rows = slice(at, at + size)
-            part = None if given is None else given[rows]
-            action, kept = file.answer(seen[rows], state[rows], None, part)
-            assert np.array_equal(action, whole[rows])
-            assert np.array_equal(kept, after[rows])
-
-
-@pytest.mark.parametrize("name", PLAIN)
-def test_policies_without_state_return_none(name: str, short_run: Run) -> None:
-    file = OnnxPolicy.load(short_run(name)[1] / "policy.onnx")
-    assert (file.memory, file.corrects) == (0, "")
+            part = file.answer(*(None if values is None else values[rows] for values in given))
+            for mine, all_of_them in zip(part, whole, strict=True):
+                assert all_of_them is None or np.array_equal(mine, all_of_them[rows])
 
 
 # --- residuals --------------------------------------------------------------------------------
 
 
-def test_untrained_residual_equals_its_controller() -> None:
+def test_untrained_residual_equals_its_controller():
     from agents.training.building import make_model
 
     config = kind("residual")
@@ -153,7 +144,7 @@ def test_untrained_residual_equals_its_controller() -> None:
 
 
 @pytest.mark.parametrize("name", CORRECTS)
-def test_residual_changes_the_action_by_its_scale_at_most(name: str, short_run: Run) -> None:
+def test_residual_changes_the_action_by_its_scale_at_most(name, short_run):
     file = OnnxPolicy.load(short_run(name)[1] / "policy.onnx")
     scale = file.card["baseline"]["scale"]
     rng = np.random.default_rng(3)
@@ -166,26 +157,21 @@ def test_residual_changes_the_action_by_its_scale_at_most(name: str, short_run: 
     assert change.max() > 0.0
 
 
-def test_a_residual_does_not_act_without_its_controller(short_run: Run) -> None:
+def test_a_residual_does_not_act_without_its_controller(short_run):
     file = OnnxPolicy.load(short_run("residual")[1] / "policy.onnx")
     with pytest.raises(ValueError, match="corrects the controller 'inverse_pid'"):
         file.predict(np.zeros(len(file.signals), np.float32))
 
 
-def test_a_residual_needs_a_known_controller_and_the_plain_range() -> None:
+def test_a_residual_needs_a_known_controller_and_the_plain_range():
     with pytest.raises(SettingsError, match="did you mean 'inverse_pid'"):
         make_env(tiny(residual={"controller": "inverse_pd"}, network={"hidden": [4]}))
+    physical = {"residual": {"controller": "inverse"}, "env_kwargs": {"normalize": False}}
     with pytest.raises(SettingsError, match="from -1 to 1"):
-        make_env(
-            tiny(
-                residual={"controller": "inverse"},
-                network={"hidden": [4]},
-                env_kwargs={"normalize": False},
-            )
-        )
+        make_env(tiny(network={"hidden": [4]}, **physical))
 
 
-def test_terminal_observation_includes_the_controllers_action() -> None:
+def test_terminal_observation_includes_the_controllers_action():
     """The bootstrap value of a truncated episode needs the controller's action."""
     config = dataclasses.replace(
         kind("residual"), plants=configs.from_mapping({"env": ID}).plants, num_envs=3
@@ -212,7 +198,7 @@ def test_terminal_observation_includes_the_controllers_action() -> None:
 # --- history and mixtures ---------------------------------------------------------------------
 
 
-def test_history_holds_past_signals_of_the_episode() -> None:
+def test_history_holds_past_signals_of_the_episode():
     env = make_env(tiny(history={"frames": 3, "signals": ["contraction", "pressure"]}))
     names = list(signals_of(env)[0].names())
     columns = [names.index("contraction"), names.index("pressure")]
@@ -237,7 +223,7 @@ def test_history_holds_past_signals_of_the_episode() -> None:
     assert np.array_equal(seen[-1][0, width:], np.tile(seen[-1][0, columns], 3))
 
 
-def test_kinds_of_plants_share_the_rows() -> None:
+def test_kinds_of_plants_share_the_rows():
     env = make_env(kind("residual", normalize={"reward": False}))
     base = env.unwrapped
     assert len(base.batches) == 2
@@ -253,7 +239,7 @@ def test_kinds_of_plants_share_the_rows() -> None:
         assert np.array_equal(alone, observation[row, :-1])
 
 
-def test_rows_on_equal_plants_have_one_controller() -> None:
+def test_rows_on_equal_plants_have_one_controller():
     config = kind("residual", share={"reference": ["sines", "steps"]}, env_kwargs={})
     env = make_env(config)
     base = env.unwrapped
@@ -261,7 +247,7 @@ def test_rows_on_equal_plants_have_one_controller() -> None:
     assert [rows for rows, _ in base.parts()] == [slice(0, 4), slice(4, 8)]
 
 
-def test_evaluation_counts_the_settled_instants_of_tuning_seeds(short_run: Run) -> None:
+def test_evaluation_counts_the_settled_instants_of_tuning_seeds(short_run):
     config = tiny(evaluation={"episodes": 3, "settle_seconds": 0.1})
     file = OnnxPolicy.load(short_run("ppo")[1] / "policy.onnx")
     score = evaluation.evaluate(file, config)
@@ -283,7 +269,7 @@ def test_evaluation_counts_the_settled_instants_of_tuning_seeds(short_run: Run) 
     assert score.failures == 0
 
 
-def test_policies_act_without_torch(short_run: Run) -> None:
+def test_policies_act_without_torch(short_run):
     """The file of a residual with memory, in a process in which torch cannot be imported."""
     place = short_run("residual_recurrent")[1] / "policy.onnx"
     code = f"""
@@ -313,7 +299,7 @@ print(action)
     assert made.stdout.startswith("[")
 
 
-def test_kinds_of_rows_are_evaluated_on_the_same_seeds(short_run: Run) -> None:
+def test_kinds_of_rows_are_evaluated_on_the_same_seeds(short_run):
     file = OnnxPolicy.load(short_run("ppo")[1] / "policy.onnx")
     both = tiny(
         plants={"hysteresis": ["maxwell_slip", "preisach"]},

@@ -1,18 +1,16 @@
 """Entry of finished runs as the complete set of training seeds of a preset."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import onnx
 import pytest
+from short_runs import with_card
 
 from agents.__main__ import main
 from agents.policies import catalogue
-from agents.policies.policy_file import CARD, write_policy
+from agents.policies.policy_file import write_policy
 from agents.settings import presets as configs
 
 PRETRAINED = catalogue.FOLDER
@@ -22,19 +20,14 @@ COMMAND = "python -m agents train PAM/KneeWalk-v0 --algo ppo --steps 10000000 --
 
 def run_of(folder: Path, seed: int, name: str = f"{NAME}.s0", **changes: Any) -> Path:
     """Return the folder of a run whose card is a shipped one but for its seed and changes."""
-    source = PRETRAINED / f"{name}.onnx"
-    model = onnx.load_model(source)
-    inside = json.loads({entry.key: entry.value for entry in model.metadata_props}[CARD])
-    card = {**inside, "seed": seed, **changes}
-    del model.metadata_props[:]
-    model.metadata_props.add(key=CARD, value=json.dumps(card))
+    made = with_card(PRETRAINED / f"{name}.onnx", seed=seed, **changes)
     folder.mkdir(parents=True)
-    write_policy(folder / "policy.onnx", model.SerializeToString(), {"training": {"seed": seed}})
+    write_policy(folder / "policy.onnx", made, {"training": {"seed": seed}})
     return folder
 
 
 @pytest.fixture
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def place(tmp_path, monkeypatch):
     """An empty folder in place of the one of the policies that come with the project."""
     folder = tmp_path / "pretrained"
     folder.mkdir()
@@ -54,7 +47,7 @@ def both(*stems: str) -> list[str]:
     return sorted(f"{stem}.{end}" for stem in stems for end in ("json", "onnx"))
 
 
-def test_runs_are_copied_under_the_presets_name(place: Path, tmp_path: Path) -> None:
+def test_runs_are_copied_under_the_presets_name(place, tmp_path):
     given = runs(tmp_path, [2, 0, 1])
     assert main(["enter", *given]) == 0
     assert names(place) == both(*(f"{NAME}.s{seed}" for seed in range(3)))
@@ -69,9 +62,7 @@ def test_runs_are_copied_under_the_presets_name(place: Path, tmp_path: Path) -> 
         assert catalogue.load_pretrained("ppo_knee_walk", training_seed=seed).card["seed"] == seed
 
 
-def test_older_files_of_a_preset_are_replaced_and_listed(
-    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_older_files_of_a_preset_are_replaced_and_listed(place, tmp_path, capsys):
     assert main(["enter", *runs(tmp_path / "old", [0, 1, 2])]) == 0
     for other in both("KneeWalk-v0.ppo-residual.s0", "KneeStairsUp-v0.ppo.s2"):
         (place / other).write_text("{}")
@@ -125,9 +116,7 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], str]] = {
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_incomplete_or_mixed_set_is_refused(
-    what: str, place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_incomplete_or_mixed_set_is_refused(what, place, tmp_path, capsys):
     cards, message = REFUSED[what]
     given = [str(run_of(tmp_path / f"run{k}", **card)) for k, card in enumerate(cards)]
     assert main(["enter", *given]) == 2
@@ -137,7 +126,7 @@ def test_incomplete_or_mixed_set_is_refused(
     assert names(place) == []
 
 
-def test_settings_without_effect_may_differ(place: Path, tmp_path: Path) -> None:
+def test_settings_without_effect_may_differ(place, tmp_path):
     config = changed(checkpoint_steps=1234, search__trials=3)
     assert main(["enter", str(run_of(tmp_path / "run", 0, config=config))]) == 0
     assert names(place) == both(f"{NAME}.s0")
@@ -159,9 +148,7 @@ def test_settings_without_effect_may_differ(place: Path, tmp_path: Path) -> None
         (lambda run: (run / "policy.onnx").write_bytes(b"no"), "is not an ONNX file"),
     ],
 )
-def test_unfinished_run_is_refused_with_its_folder(
-    spoil: Any, message: str, place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_unfinished_run_is_refused_with_its_folder(spoil, message, place, tmp_path, capsys):
     given = runs(tmp_path, [0, 1])
     spoil(Path(given[1]))
     assert main(["enter", *given]) == 2
@@ -171,9 +158,7 @@ def test_unfinished_run_is_refused_with_its_folder(
     assert names(place) == []
 
 
-def test_users_preset_is_entered_under_its_own_name(
-    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_users_preset_is_entered_under_its_own_name(place, tmp_path, monkeypatch, capsys):
     folder = tmp_path / "configs"
     folder.mkdir()
     for name in (NAME, "KneeWalk-v0.sac"):

@@ -1,9 +1,6 @@
 """Catalogue of policies: entries of presets, also of a user's, and checks of the files."""
 
-from __future__ import annotations
-
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -16,7 +13,7 @@ BASE = "extends: KneeWalk-v0.ppo\n"
 
 
 @pytest.fixture
-def presets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def presets(tmp_path, monkeypatch):
     """A folder of presets that may be changed."""
     folder = tmp_path / "configs"
     shutil.copytree(configs.FOLDER, folder)
@@ -24,7 +21,7 @@ def presets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_users_preset_has_an_entry_with_its_comment_as_summary(presets: Path) -> None:
+def test_users_preset_has_an_entry_with_its_comment_as_summary(presets):
     (presets / "KneeWalk-v0.ppo-mine.yaml").write_text(f"# PPO, with my network.\n{BASE}")
     (presets / "KneeWalk-v0.ppo-terse.yaml").write_text(BASE)
     made = catalogue.offered()
@@ -38,7 +35,7 @@ def test_users_preset_has_an_entry_with_its_comment_as_summary(presets: Path) ->
     assert made["ppo_terse_knee_walk"].summary.startswith("ppo, variant terse;")
 
 
-def test_users_residual_is_recognised_by_its_settings(presets: Path) -> None:
+def test_users_residual_is_recognised_by_its_settings(presets):
     text = "extends: KneeWalk-v0.sac\nsearch: {trials: 3}\n"
     text += "residual: {controller: knee_pid, scale: 0.1}\n"
     (presets / "KneeWalk-v0.sac-on_pid.yaml").write_text(text)
@@ -67,20 +64,18 @@ def test_users_residual_is_recognised_by_its_settings(presets: Path) -> None:
         ),
     ],
 )
-def test_invalid_preset_is_named(name: str, text: str, message: str, presets: Path) -> None:
+def test_invalid_preset_is_named(name, text, message, presets):
     (presets / f"{name}.yaml").write_text(text)
     with pytest.raises(SettingsError, match=message):
         catalogue.offered()
 
 
-def test_unlisted_environment_gets_its_snake_case_name_as_suffix() -> None:
+def test_unlisted_environment_gets_its_snake_case_name_as_suffix():
     assert catalogue._suffix("AnkleBrace2-v0") == "_ankle_brace2"
     assert catalogue._suffix("MusclePositioning-v0") == ""
 
 
-def test_policy_file_without_a_preset_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_policy_file_without_a_preset_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
     (tmp_path / "KneeWalk-v0.ppo.s3.onnx").touch()
     catalogue.check_files(catalogue.OFFERED)

@@ -1,7 +1,5 @@
 """Hyper-parameter search: proposals, resumption, budget in the preset's file."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import signal
@@ -14,9 +12,9 @@ from typing import Any
 import optuna
 import pytest
 from optuna.trial import TrialState
-from short_runs import ID, KINDS, QUIET, kind, tiny
+from short_runs import ID, QUIET, tiny
 
-from agents.search import preset_text, tune
+from agents.search import tune
 from agents.search.spaces import as_settings, from_settings, space_of, suggest, with_settings
 from agents.settings import presets as configs
 from agents.settings.parts import Plants, Search
@@ -24,6 +22,7 @@ from agents.settings.presets import Config
 from agents.settings.schema import SettingsError
 from agents.training.evaluation import Score, value_of
 
+pytestmark = pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
 LOOK = {"episodes": 2, "settle_seconds": 0.1}
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -42,19 +41,7 @@ def tried(study: optuna.Study) -> list[tuple[Any, Any]]:
     return [(trial.params, trial.value) for trial in trials]
 
 
-@pytest.mark.parametrize("name", KINDS)
-def test_search_space_contains_the_preset(name: str) -> None:
-    config = kind(name)
-    values = from_settings(config)
-    assert set(values) == set(space_of(config))
-    chosen = suggest(optuna.trial.FixedTrial(values), config)
-    again = with_settings(config, as_settings(config, chosen))
-    assert again.algo == config.algo
-    assert again.chosen.gamma == pytest.approx(config.chosen.gamma, abs=2e-5)
-
-
-@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_resumed_search_makes_the_same_proposals(tmp_path: Path) -> None:
+def test_resumed_search_makes_the_same_proposals(tmp_path):
     for place in ("whole", "parts"):
         (tmp_path / place).mkdir()
     whole = tune.search(job(tmp_path / "whole", 3), QUIET)
@@ -66,10 +53,7 @@ def test_resumed_search_makes_the_same_proposals(tmp_path: Path) -> None:
     assert tune.finished(tune.search(job(tmp_path / "whole", 3), QUIET)) == 3
 
 
-@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_trial_of_a_killed_process_is_repeated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_trial_of_a_killed_process_is_repeated(tmp_path, monkeypatch):
     code = f"""
 import sys, time
 sys.path[:0] = {[str(path) for path in Path(__file__).parents[:2]]!r}
@@ -89,7 +73,6 @@ tune.search(test_tune.job(Path({str(tmp_path)!r}), 1), test_tune.QUIET)
     process = subprocess.Popen(
         [sys.executable, "-W", "ignore", "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True
     )
-    assert process.stdout is not None
     assert process.stdout.readline() == "running\n"
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
@@ -107,8 +90,7 @@ tune.search(test_tune.job(Path({str(tmp_path)!r}), 1), test_tune.QUIET)
     assert done.params == from_settings(small())
 
 
-@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_budget_includes_earlier_searches(tmp_path: Path) -> None:
+def test_budget_includes_earlier_searches(tmp_path):
     path = tmp_path / "preset.yaml"
     path.write_text(configs.preset_path(ID, "ppo").read_text(encoding="utf-8"), encoding="utf-8")
     made = job(tmp_path, 1, search={"trials": 20, "earlier": 5})
@@ -120,8 +102,7 @@ def test_budget_includes_earlier_searches(tmp_path: Path) -> None:
     assert (again.search.trials, again.search.earlier) == (2, 25)
 
 
-@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_best_settings_and_budget_are_written(tmp_path: Path) -> None:
+def test_best_settings_and_budget_are_written(tmp_path):
     made = job(tmp_path, 2)
     study = tune.search(made, QUIET)
     path = tmp_path / "preset.yaml"
@@ -147,7 +128,7 @@ def test_best_settings_and_budget_are_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("note", ["a: b # c", "a, b"])
 @pytest.mark.parametrize("names", sorted(configs.presets()))
-def test_every_preset_can_be_edited_in_place(names: tuple[str, str, str], note: str) -> None:
+def test_every_preset_can_be_edited_in_place(names, note):
     path = configs.preset_path(*names)
     config = configs.read(path)
     changes = {
@@ -156,7 +137,7 @@ def test_every_preset_can_be_edited_in_place(names: tuple[str, str, str], note: 
         "search.note": note,
         "steps": 12_345,
     }
-    text = preset_text.edited(path.read_text(encoding="utf-8"), changes)
+    text = tune.edited(path.read_text(encoding="utf-8"), changes)
     assert configs.from_text(text) == with_settings(config, changes)
     before = path.read_text(encoding="utf-8")
     assert before.splitlines()[0] == text.splitlines()[0]
@@ -166,7 +147,7 @@ def _chosen(config: Config) -> dict[str, Any]:
     return suggest(optuna.trial.FixedTrial(from_settings(config)), config)
 
 
-def test_failed_episode_increases_the_value() -> None:
+def test_failed_episode_increases_the_value():
     good, bad = Score(0.1, -1.0, 0), Score(0.1, -1.0, 2)
     assert value_of(bad, small()) > 2 * value_of(good, small())
     assert value_of(Score(float("nan"), 0.0, 0), small()) == float("inf")
@@ -177,19 +158,20 @@ def test_failed_episode_increases_the_value() -> None:
     assert value_of(score, by_ratio) == pytest.approx(0.02)
 
 
-def test_excess_travel_increases_the_value() -> None:
+def test_excess_travel_increases_the_value():
     assert value_of(Score(0.1, 0.0, 0, travel=105.0), small(), 100.0) == pytest.approx(0.1)
     assert value_of(Score(0.1, 0.0, 0, travel=210.0), small(), 100.0) == pytest.approx(0.2)
     assert value_of(Score(0.1, 0.0, 0, travel=210.0), small()) == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("names", sorted(configs.presets()))
-def test_the_first_trial_is_the_preset_itself(names: tuple[str, str, str]) -> None:
+def test_the_first_trial_is_the_preset_itself(names):
     config = configs.preset(*names)
+    assert set(from_settings(config)) == set(space_of(config))
     assert with_settings(config, as_settings(config, _chosen(config))) == config
 
 
-def test_study_name_identifies_fixed_settings(tmp_path: Path) -> None:
+def test_study_name_identifies_fixed_settings(tmp_path):
     one = job(tmp_path)
 
     def named(**changes: Any) -> str:
@@ -207,10 +189,7 @@ def test_study_name_identifies_fixed_settings(tmp_path: Path) -> None:
     assert len({one.name, *others}) == 5
 
 
-@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_parallel_searches_propose_different_settings(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_parallel_searches_propose_different_settings(tmp_path, monkeypatch):
     proposed = {}
 
     def objective(made: tune.Job, trial: optuna.Trial) -> float:
@@ -225,12 +204,12 @@ def test_parallel_searches_propose_different_settings(
     assert proposed[1] != proposed[2]
 
 
-def test_search_seeds_differ_from_reported_seeds() -> None:
+def test_search_seeds_differ_from_reported_seeds():
     assert min(tune.TRAINING_SEEDS) >= 10_000
     assert len(set(tune.TRAINING_SEEDS)) == 2
 
 
-def test_search_needs_evaluations(tmp_path: Path) -> None:
+def test_search_needs_evaluations(tmp_path):
     blind = tune.Job(tiny(), 1, 256, 0, tmp_path / "s.db")
     with pytest.raises(SettingsError, match=r"evaluation.episodes = 0"):
         tune.search(blind, QUIET)

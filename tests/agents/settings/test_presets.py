@@ -1,7 +1,5 @@
 """Common properties of the presets."""
 
-from __future__ import annotations
-
 import math
 
 import gymnasium as gym
@@ -15,25 +13,25 @@ EVERY = [("ppo", ""), ("ppo", "residual")]
 
 
 @pytest.mark.parametrize("names", PRESETS, ids="-".join)
-def test_presets_train_on_both_hysteresis_models(names: tuple[str, str, str]) -> None:
+def test_presets_train_on_both_hysteresis_models(names):
     assert configs.preset(*names).plants.hysteresis == ("maxwell_slip", "preisach")
 
 
 @pytest.mark.parametrize("names", PRESETS, ids="-".join)
-def test_budget_is_counted_or_by_hand(names: tuple[str, str, str]) -> None:
+def test_budget_is_counted_or_by_hand(names):
     search = configs.preset(*names).search
     assert search.note.startswith("by hand") if search.trials is None else search.trials > 0
 
 
 @pytest.mark.parametrize("names", PRESETS, ids="-".join)
-def test_every_kind_of_row_is_evaluated(names: tuple[str, str, str]) -> None:
+def test_every_kind_of_row_is_evaluated(names):
     config = configs.preset(*names)
     assert config.evaluation.interval > 0
     assert config.evaluation.episodes >= 4 * len(config.kinds())
 
 
 @pytest.mark.parametrize("names", [n for n in PRESETS if n[1:] in EVERY], ids="-".join)
-def test_environment_of_every_kind_of_row_exists(names: tuple[str, str, str]) -> None:
+def test_environment_of_every_kind_of_row_exists(names):
     config = configs.preset(*names)
     for kind in config.kinds():
         gym.make(config.env, **kind).close()
@@ -41,7 +39,7 @@ def test_environment_of_every_kind_of_row_exists(names: tuple[str, str, str]) ->
 
 
 @pytest.mark.parametrize("names", RESIDUAL, ids="-".join)
-def test_residual_presets_limit_exploration(names: tuple[str, str, str]) -> None:
+def test_residual_presets_limit_exploration(names):
     config = configs.preset(*names)
     assert config.ppo.warm_up > 0
     assert config.ppo.target_kl is not None

@@ -1,7 +1,5 @@
 """Export of the best evaluated policy."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -55,9 +53,7 @@ def same(mine: dict[str, torch.Tensor], theirs: dict[str, torch.Tensor]) -> bool
 
 
 @pytest.mark.parametrize("algo", configs.ALGORITHMS)
-def test_best_policy_is_exported_instead_of_the_last(
-    algo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_best_policy_is_exported_instead_of_the_last(algo, tmp_path, monkeypatch):
     values = {0: 5.0, 512: 1.0, 1024: 3.0}
     judge, model, card = judged(run_in(tmp_path, algo), values, monkeypatch)
     assert card["chosen"] == {"steps": 512, "of": 3, "value": 1.0}
@@ -67,9 +63,7 @@ def test_best_policy_is_exported_instead_of_the_last(
     assert not same(judge.seen[1024], judge.seen[512])
 
 
-def test_command_prints_the_evaluations(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_prints_the_evaluations(tmp_path, monkeypatch, capsys):
     judged(run_in(tmp_path), {0: 5.0, 512: 1.0, 1024: 3.0}, monkeypatch)
     capsys.readouterr()
     assert main(["evaluations", str(tmp_path / "policy.onnx")]) == 0
@@ -79,9 +73,7 @@ def test_command_prints_the_evaluations(
     assert ["exported" in line for line in lines] == [False, True, False]
 
 
-def test_exported_normaliser_belongs_to_the_best_policy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_exported_normaliser_belongs_to_the_best_policy(tmp_path, monkeypatch):
     run = run_in(tmp_path / "whole", normalize=NORMALIZED)
     _, model, _ = judged(run, {0: 5.0, 512: 1.0, 1024: 3.0}, monkeypatch)
     half = Run(run.config, 3, tmp_path / "half")
@@ -91,17 +83,13 @@ def test_exported_normaliser_belongs_to_the_best_policy(
     assert not np.array_equal(mine.mean, theirs.mean)
 
 
-def test_untrained_policy_is_exported_only_if_none_is_better(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_untrained_policy_is_exported_only_if_none_is_better(tmp_path, monkeypatch):
     judge, model, card = judged(run_in(tmp_path), {0: 1.0, 512: 1.0, 1024: 2.0}, monkeypatch)
     assert card["chosen"] == {"steps": 0, "of": 3, "value": 1.0, "note": best.UNTRAINED}
     assert same(model.policy.state_dict(), judge.seen[0])
 
 
-def test_policy_without_a_value_is_not_preferred(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_policy_without_a_value_is_not_preferred(tmp_path, monkeypatch):
     values = {0: float("nan"), 512: float("nan"), 1024: float("nan")}
     _, _, card = judged(run_in(tmp_path), values, monkeypatch)
     assert card["chosen"] == {"steps": 1024, "of": 3}
@@ -109,9 +97,7 @@ def test_policy_without_a_value_is_not_preferred(
 
 
 @pytest.mark.parametrize("normalize", [{}, {"normalize": NORMALIZED}], ids=["plain", "normalized"])
-def test_resumed_run_keeps_its_best_policy(
-    normalize: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_resumed_run_keeps_its_best_policy(normalize, tmp_path, monkeypatch):
     values = {0: 5.0, 512: 1.0, 1024: 3.0}
     _, _, card = judged(run_in(tmp_path / "whole", **normalize), values, monkeypatch)
     assert card["chosen"]["steps"] == 512
@@ -122,9 +108,7 @@ def test_resumed_run_keeps_its_best_policy(
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
-def test_longer_training_continues_from_the_last_policy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_longer_training_continues_from_the_last_policy(tmp_path, monkeypatch):
     values = {0: 5.0, 512: 1.0, 1024: 3.0, 1536: 0.5}
     run = run_in(tmp_path)
     judge, _, _ = judged(run, values, monkeypatch)

@@ -1,7 +1,5 @@
 """Training runs: exact resumption, checkpoints, cards and records."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json
@@ -10,7 +8,6 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +24,7 @@ from agents.policies.policy_file import finished
 from agents.settings import presets as configs
 from agents.settings import seeds
 from agents.settings.parts import Evaluation
-from agents.training import checkpoint, train
+from agents.training import checkpoint, record, train
 from agents.training.building import make_env, make_model
 from agents.training.checkpoint import MARK, CheckpointError
 from agents.training.record import CHECKPOINT, Run
@@ -39,9 +36,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_resumed_run_equals_the_uninterrupted_one(
-    name: str, tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
-) -> None:
+def test_resumed_run_equals_the_uninterrupted_one(name, tmp_path, short_run):
     whole, folder = short_run(name)
     run = Run(kind(name), 3, tmp_path)
     killed_after(run, 700)
@@ -55,34 +50,12 @@ def test_resumed_run_equals_the_uninterrupted_one(
     assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
 
 
-def test_resumed_run_restores_the_normaliser(
-    tmp_path: Path, normalized_ppo: tuple[Any, Path]
-) -> None:
-    whole, folder = normalized_ppo
-    run = Run(tiny(**_parts(whole, folder)), 3, tmp_path)
-    killed_after(run, 512)
-    model = train.resume(train.saved_run(tmp_path))
-    train.train(run, model, QUIET)
-    moments, theirs = (m.get_vec_normalize_env().obs_rms for m in (model, whole))
-    assert np.array_equal(moments.mean, theirs.mean)
-    assert np.array_equal(moments.var, theirs.var)
-    assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
-
-
-def _parts(model: Any, folder: Path) -> dict[str, Any]:
-    plain = train.saved_run(folder).config.as_dict()
-    return {"network": plain["network"], "normalize": plain["normalize"]}
-
-
-def test_another_seed_gives_another_policy(tmp_path: Path, ppo: tuple[Any, Path]) -> None:
+def test_another_seed_gives_another_policy(tmp_path, ppo):
     other = trained(tmp_path, tiny(), seed=4)
-    assert not torch.equal(
-        other.policy.action_net.weight,
-        ppo[0].policy.action_net.weight,
-    )
+    assert not torch.equal(other.policy.action_net.weight, ppo[0].policy.action_net.weight)
 
 
-def test_a_killed_process_resumes_from_the_command_line(tmp_path: Path) -> None:
+def test_a_killed_process_resumes_from_the_command_line(tmp_path):
     config = tmp_path / "tiny.yaml"
     config.write_text(yaml.safe_dump({**tiny().as_dict(), "steps": 20_000}))
     base = ["train", ID, "--seed", "5", "--config", str(config), "--out"]
@@ -107,9 +80,7 @@ def test_a_killed_process_resumes_from_the_command_line(tmp_path: Path) -> None:
     assert (folder / "policy.onnx").read_bytes() == whole
 
 
-def test_an_interrupted_write_leaves_the_old_checkpoint(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_write_leaves_the_old_checkpoint(tmp_path, monkeypatch):
     file = tmp_path / CHECKPOINT
     checkpoint.save(file, {"a": np.arange(3)})
     before = file.read_bytes()
@@ -124,7 +95,7 @@ def test_an_interrupted_write_leaves_the_old_checkpoint(
     assert checkpoint.load(file)["a"].tolist() == [0, 1, 2]
 
 
-def test_damaged_or_foreign_checkpoint_is_refused(tmp_path: Path) -> None:
+def test_damaged_or_foreign_checkpoint_is_refused(tmp_path):
     file = tmp_path / CHECKPOINT
     checkpoint.save(file, {"a": np.arange(300)})
     good = file.read_bytes()
@@ -141,7 +112,7 @@ def test_damaged_or_foreign_checkpoint_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:Detected pickle protocol")
-def test_a_checkpoint_cannot_run_code(tmp_path: Path) -> None:
+def test_a_checkpoint_cannot_run_code(tmp_path):
     marker = tmp_path / "ran"
 
     class Doctored:
@@ -158,9 +129,7 @@ def test_a_checkpoint_cannot_run_code(tmp_path: Path) -> None:
     assert not marker.exists()
 
 
-def test_a_run_is_neither_overwritten_nor_resumed_with_other_settings(
-    ppo: tuple[Any, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_is_neither_overwritten_nor_resumed_with_other_settings(ppo, tmp_path, capsys):
     folder = str(ppo[1])
     before = (ppo[1] / CHECKPOINT).read_bytes()
     assert main(["train", ID, "--out", folder]) == 2
@@ -172,7 +141,7 @@ def test_a_run_is_neither_overwritten_nor_resumed_with_other_settings(
     assert (ppo[1] / CHECKPOINT).read_bytes() == before
 
 
-def test_run_is_not_resumed_on_a_changed_plant(ppo: tuple[Any, Path], tmp_path: Path) -> None:
+def test_run_is_not_resumed_on_a_changed_plant(ppo, tmp_path):
     content = checkpoint.load(ppo[1] / CHECKPOINT)
     digest = ppo[0].get_env().get_attr("plant")[0].digest()
     content["settings"] = content["settings"].replace(digest, "0123456789abcdef")
@@ -184,26 +153,12 @@ def test_run_is_not_resumed_on_a_changed_plant(ppo: tuple[Any, Path], tmp_path: 
 @pytest.mark.parametrize(
     "given", [["PAM/KneeWalk-v0"], [ID, "--algo", "sac"], [ID, "--seed", "4"]], ids=str
 )
-def test_run_is_not_resumed_as_another(
-    given: list[str], ppo: tuple[Any, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_run_is_not_resumed_as_another(given, ppo, capsys):
     assert main(["train", *given, "--out", str(ppo[1]), "--resume"]) == 2
     assert f": leave {given[-1]} out" in capsys.readouterr().err
 
 
-def test_policy_without_its_record_is_exported_again(
-    tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
-) -> None:
-    _, folder = short_run("ppo")
-    run = Run(kind("ppo"), 3, tmp_path)
-    for name in (CHECKPOINT, "policy.onnx"):  # without its record
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
-    assert train.train_to_the_end(run, QUIET) == tmp_path / "policy.onnx"
-    assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
-    assert (tmp_path / "policy.json").is_file()
-
-
-def test_log_and_card_are_written(ppo: tuple[Any, Path]) -> None:
+def test_log_and_card_are_written(ppo):
     folder = ppo[1]
     assert list((folder / "tensorboard").glob("events*"))
     card = OnnxPolicy.load(folder / "policy.onnx").card
@@ -217,7 +172,7 @@ def test_log_and_card_are_written(ppo: tuple[Any, Path]) -> None:
     assert str(ROOT) not in text
 
 
-def test_training_tuning_and_scored_seeds_are_disjoint() -> None:
+def test_training_tuning_and_scored_seeds_are_disjoint():
     config = tiny()
     env = make_env(config)
     make_model(config, 0, env)
@@ -229,9 +184,7 @@ def test_training_tuning_and_scored_seeds_are_disjoint() -> None:
     assert max(scored | tuned) < seeds.first_training(0)
 
 
-def test_record_holds_the_cost_of_the_training(
-    short_run: Callable[[str], tuple[Any, Path]],
-) -> None:
+def test_record_holds_the_cost_of_the_training(short_run):
     _, folder = short_run("history")
     cost = json.loads((folder / "policy.json").read_text())["training"]
     card = OnnxPolicy.load(folder / "policy.onnx").card
@@ -250,9 +203,7 @@ def test_record_holds_the_cost_of_the_training(
     assert b"tuning/rms" in log
 
 
-def test_evaluations_do_not_change_the_training(
-    tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
-) -> None:
+def test_evaluations_do_not_change_the_training(tmp_path, short_run):
     _, watched = short_run("history")
     trained(tmp_path, dataclasses.replace(kind("history"), evaluation=Evaluation()))
     ends = [checkpoint.load(folder / CHECKPOINT) for folder in (watched, tmp_path)]
@@ -262,9 +213,7 @@ def test_evaluations_do_not_change_the_training(
     assert not {"evaluation", "chosen"} & set(card)
 
 
-def test_finished_run_is_kept_and_another_refused(
-    short_run: Callable[[str], tuple[Any, Path]],
-) -> None:
+def test_finished_run_is_kept_and_another_refused(short_run):
     _, folder = short_run("ppo")
     before = (folder / "policy.json").stat().st_mtime_ns
     run = Run(kind("ppo"), 3, folder)
@@ -274,7 +223,7 @@ def test_finished_run_is_kept_and_another_refused(
         train.train_to_the_end(Run(kind("ppo"), 4, folder), QUIET)
 
 
-def test_the_command_names_the_variant() -> None:
+def test_the_command_names_the_variant():
     preset = configs.preset(ID, "ppo", "residual")
     command = Run(preset, 7, Path("x")).command()
     assert command.endswith(f"--steps {preset.steps} --seed 7 --variant residual")
@@ -282,7 +231,7 @@ def test_the_command_names_the_variant() -> None:
     assert Run(other, 7, Path("x")).command().endswith("--config policy.onnx")
 
 
-def test_learning_improves_the_return(tmp_path: Path) -> None:
+def test_learning_improves_the_return(tmp_path):
     config = configs.changed(
         configs.preset(ID, "ppo"),
         ["steps=200_000", "num_envs=64", "env_kwargs.load=2.55", "env_kwargs.episode_seconds=4.0"],
@@ -299,3 +248,19 @@ def test_learning_improves_the_return(tmp_path: Path) -> None:
     train.train(run, model, QUIET)
     assert score(OnnxPolicy.load(tmp_path / "policy.onnx")) > 0.5 * untrained
     assert untrained < 0.0
+
+
+def cost_of(config: configs.Config, steps: int) -> dict[str, Any]:
+    return record.cost(record.Run(config, 3, Path("x")), {"wall": 2.0, "cpu": 1.0}, steps)
+
+
+def test_record_counts_the_completed_steps():
+    done = cost_of(tiny(), 1_030)
+    assert (done["steps"], done["frames_per_second"]) == (1_030, 515)
+
+
+def test_settings_chosen_by_hand_have_no_number_of_trials():
+    by_hand = configs.from_mapping({"env": ID})
+    assert json.loads(json.dumps(cost_of(by_hand, 7)))["tuning_trials"] is None
+    searched = configs.changed(by_hand, ["search.trials=40"])
+    assert cost_of(searched, 7)["tuning_trials"] == 40

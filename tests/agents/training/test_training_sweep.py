@@ -1,13 +1,9 @@
 """Sweeps of training seeds: the same policies as single trainings, even after kills."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 import subprocess
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
@@ -45,7 +41,7 @@ sys.exit(bool(report.missing))
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[int, bytes]:
+def whole(tmp_path_factory):
     """Return the policies of undisturbed trainings, by seed."""
     policies = {}
     for seed in SEEDS:
@@ -55,7 +51,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[int, bytes]:
 
 
 @pytest.fixture(scope="module")
-def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskProcesses]:
+def dask(tmp_path_factory):
     """A scheduler and two workers."""
     pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
     with DaskProcesses(tmp_path_factory.mktemp("dask")) as made:
@@ -96,9 +92,7 @@ class Driver:
         }
 
 
-def test_killed_driver_and_worker_leave_the_policies_unchanged(
-    tmp_path: Path, whole: dict[int, bytes]
-) -> None:
+def test_killed_driver_and_worker_leave_the_policies_unchanged(tmp_path, whole):
     driver = Driver(tmp_path)
     running = driver.start()
     wait_until(driver.under_way)
@@ -114,9 +108,7 @@ def test_killed_driver_and_worker_leave_the_policies_unchanged(
     wait_until(lambda: not alive(driver.family))
 
 
-def test_killed_dask_worker_and_driver_lose_no_training(
-    tmp_path: Path, dask: DaskProcesses, whole: dict[int, bytes]
-) -> None:
+def test_killed_dask_worker_and_driver_lose_no_training(tmp_path, dask, whole):
     driver = Driver(tmp_path, dask.address)
     running = driver.start()
     wait_until(driver.under_way)
@@ -129,7 +121,7 @@ def test_killed_dask_worker_and_driver_lose_no_training(
     assert driver.policies() == whole
 
 
-def test_training_of_an_ended_sweep_stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_training_of_an_ended_sweep_stops(tmp_path, monkeypatch):
     answers = iter([True, True, False])
     monkeypatch.setattr(callbacks, "is_needed", lambda: next(answers))
     (training,) = sweep.trainings([CONFIG], (3,), tmp_path, "ppo")
@@ -138,9 +130,7 @@ def test_training_of_an_ended_sweep_stops(tmp_path: Path, monkeypatch: pytest.Mo
     assert not training.finished()
 
 
-def test_policy_of_a_remote_worker_is_stored(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_policy_of_a_remote_worker_is_stored(tmp_path, monkeypatch):
     files = {"policy.onnx": b"policy", "policy.json": b"{}"}
     monkeypatch.setattr(sweep, "train", lambda training: files)
     (training,) = sweep.trainings([CONFIG], (3,), tmp_path, "ppo")
@@ -151,7 +141,7 @@ def test_policy_of_a_remote_worker_is_stored(
     assert ticks == [1]
 
 
-def test_policy_of_other_settings_is_refused(tmp_path: Path, ppo: tuple[object, Path]) -> None:
+def test_policy_of_other_settings_is_refused(tmp_path, ppo):
     def training(config: configs.Config, seed: int) -> Run:
         return Run(config, seed, ppo[1])
 
@@ -162,9 +152,7 @@ def test_policy_of_other_settings_is_refused(tmp_path: Path, ppo: tuple[object, 
             other.finished()
 
 
-def test_policy_without_its_record_is_trained_again(
-    tmp_path: Path, whole: dict[int, bytes]
-) -> None:
+def test_policy_without_its_record_is_trained_again(tmp_path, whole):
     """A process may be killed between the two files."""
     training = Run(CONFIG, 3, tmp_path / "there")
     train.train_to_the_end(training, QUIET)
@@ -181,43 +169,28 @@ def test_policy_without_its_record_is_trained_again(
     assert policy.read_bytes() == whole[3]
 
 
-def test_record_is_written_before_the_policy(
-    ppo: tuple[Any, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_record_is_written_before_the_policy(ppo, tmp_path, monkeypatch):
     written: list[str] = []
-    monkeypatch.setattr(policy_file, "write_atomically", lambda path, _: written.append(path.name))
+    monkeypatch.setattr(policy_file, "write_bytes", lambda path, _: written.append(path.name))
     export.export_policy(ppo[0], tmp_path / "policy.onnx")
     assert written == ["policy.json", "policy.onnx"]
 
 
-def test_worker_with_other_code_refuses_the_training(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("other", ["code", "gymnasium", "scipy", "torch", "stable_baselines3"])
+def test_worker_with_other_code_or_versions_refuses_the_training(other, tmp_path, monkeypatch):
     """A worker that computes another key than the driver's refuses the task."""
     training = Run(CONFIG, 3, tmp_path)
-    key = training.key
-    assert Run(CONFIG, 3, tmp_path).key == key
-    monkeypatch.setattr(record, "code", lambda: "0")
-    assert training.key != key
-
-
-@pytest.mark.parametrize("package", ["gymnasium", "scipy", "torch", "stable_baselines3"])
-def test_worker_with_other_versions_refuses_the_training(
-    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    training = Run(CONFIG, 3, tmp_path)
     key, known = training.key, importlib.metadata.version
-
-    def other(name: str) -> str:
-        return "0.0" if name == package else known(name)
-
-    monkeypatch.setattr(importlib.metadata, "version", other)
+    assert Run(CONFIG, 3, tmp_path).key == key
+    if other == "code":
+        monkeypatch.setattr(record, "code", lambda: "0")
+    else:
+        patched = {other: "0.0"}
+        monkeypatch.setattr(importlib.metadata, "version", lambda n: patched.get(n) or known(n))
     assert training.key != key
 
 
-def test_code_is_every_python_file_of_the_packages(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_code_is_every_python_file_of_the_packages(tmp_path, monkeypatch):
     monkeypatch.setattr(record, "ROOT", tmp_path)
     folders = [tmp_path / name for name in ("agents", "baselines", "pam_envs")]
 
@@ -238,7 +211,7 @@ def test_code_is_every_python_file_of_the_packages(
     record.code.cache_clear()
 
 
-def test_failed_training_is_missing_with_the_reason(tmp_path: Path) -> None:
+def test_failed_training_is_missing_with_the_reason(tmp_path):
     wrong = configs.changed(tiny(), ["env_kwargs.load=99.0"])
     (training,) = sweep.trainings([wrong], (3,), tmp_path, "ppo")
     report = sweep.run([training], Cluster())
@@ -247,19 +220,14 @@ def test_failed_training_is_missing_with_the_reason(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def ask(tmp_path: Path) -> Callable[..., int]:
+def ask(tmp_path):
     """Return what runs the command with two seeds."""
     return lambda *arguments: main(
         ["sweep", ID, "--seeds", "2", "--out", str(tmp_path), *arguments]
     )
 
 
-def test_command_lists_refuses_and_reports(
-    ask: Callable[..., int],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_command_lists_refuses_and_reports(ask, tmp_path, monkeypatch, capsys):
     assert ask("--dry-run", "--first-seed", "7") == 0
     listed = capsys.readouterr().out.splitlines()
     assert [line.split()[-1].rpartition("/")[2] for line in listed] == ["ppo-seed7", "ppo-seed8"]

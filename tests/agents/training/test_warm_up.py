@@ -1,23 +1,18 @@
 """Critic warm-up: the policy is frozen, and its learning rate rises from 0 afterwards."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
-from short_runs import QUIET, killed_after, tiny
+from short_runs import tiny
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
 from agents.policies.networks import CRITIC
 from agents.settings import presets as configs
 from agents.settings.schema import SettingsError
-from agents.training import train
 from agents.training.building import learning_rate, make_env, make_model, warm_up_steps
 from agents.training.callbacks import WarmUp
-from agents.training.record import Run
 
 ROLLOUT = 128
 KINDS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -55,7 +50,7 @@ def config_of(name: str, warm_up: int, **changes: Any) -> configs.Config:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_critic_alone_learns_in_the_warm_up(name: str) -> None:
+def test_critic_alone_learns_in_the_warm_up(name):
     config = config_of(name, 2, steps=5 * ROLLOUT)
     model = make_model(config, 0, make_env(config))
     model.set_logger(Logger(None, []))
@@ -78,7 +73,7 @@ def test_critic_alone_learns_in_the_warm_up(name: str) -> None:
     assert all(parameter.requires_grad for parameter in model.policy.parameters())
 
 
-def test_rate_rises_from_zero_after_the_warm_up() -> None:
+def test_rate_rises_from_zero_after_the_warm_up():
     config = config_of("plain", 4, steps=100 * ROLLOUT)
     usual = learning_rate(config_of("plain", 0, steps=100 * ROLLOUT))
     rate = learning_rate(config)
@@ -89,29 +84,17 @@ def test_rate_rises_from_zero_after_the_warm_up() -> None:
     assert shares[9:] == [1.0] * 92
 
 
-def test_rate_is_not_negative_beyond_the_end() -> None:
+def test_rate_is_not_negative_beyond_the_end():
     rate = learning_rate(config_of("plain", 0, steps=100 * ROLLOUT))
     assert rate(-0.5) == 0.0 < rate(0.5)
 
 
-def test_warm_up_to_the_end_is_refused() -> None:
+def test_warm_up_to_the_end_is_refused():
     with pytest.raises(SettingsError, match="warm_up = 8 rollouts are 1024 steps of 1024"):
         learning_rate(config_of("plain", 8))
 
 
-def test_off_policy_algorithms_have_no_warm_up() -> None:
+def test_off_policy_algorithms_have_no_warm_up():
     assert warm_up_steps(tiny("sac")) == 0
     with pytest.raises(SettingsError, match=r"unknown setting 'sac\.warm_up'"):
         tiny("sac", sac={"warm_up": 2})
-
-
-@pytest.mark.parametrize("name", ["structured", "recurrent"])
-def test_run_killed_in_the_warm_up_resumes_exactly(name: str, tmp_path: Path) -> None:
-    config = config_of(name, 4)
-    whole = train.train_to_the_end(Run(config, 3, tmp_path / "whole"), QUIET)
-    run = Run(config, 3, tmp_path / "killed")
-    killed_after(run, 3 * ROLLOUT)
-    model = train.resume(run)
-    assert 0 < model.num_timesteps < warm_up_steps(config)
-    policy = train.train(run, model, QUIET)
-    assert policy.read_bytes() == whole.read_bytes()

@@ -1,8 +1,5 @@
 """Adapter of batched environments to stable-baselines3."""
 
-from __future__ import annotations
-
-import copy
 import warnings
 
 import gymnasium as gym
@@ -11,9 +8,9 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from short_runs import ID
 from stable_baselines3.common.env_checker import check_env
-from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import VecMonitor
 
-from agents.vec_envs.batch import NO_INFO, BatchVecEnv, make_batch_vec_env
+from agents.vec_envs.batch import BatchVecEnv, make_batch_vec_env
 
 N, SEED = 5, 40
 SHORT = {"episode_seconds": 0.12, "reference": "mixed", "load": None}
@@ -23,14 +20,14 @@ def actions(steps: int) -> np.ndarray:
     return np.random.default_rng(0).uniform(-1, 1, (steps, N, 1)).astype(np.float32)
 
 
-def test_single_environment_passes_the_checker_without_a_warning() -> None:
+def test_single_environment_passes_the_checker_without_a_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(gym.make(ID).unwrapped)
         check_env(gym.make(ID, normalize=True, reference="mixed", load=None).unwrapped)
 
 
-def test_rows_equal_batched_and_single_environments() -> None:
+def test_rows_equal_batched_and_single_environments():
     env = make_batch_vec_env(ID, N, **SHORT)
     batch = gym.make_vec(ID, N, vectorization_mode="vector_entry_point", **SHORT)
     singles = [gym.make(ID, **SHORT) for _ in range(N)]
@@ -58,7 +55,7 @@ def test_rows_equal_batched_and_single_environments() -> None:
     assert resets >= 4 * N
 
 
-def test_termination_is_not_called_a_truncation() -> None:
+def test_termination_is_not_called_a_truncation():
     limits = {"highest_contraction": 0.004}
     env = make_batch_vec_env(ID, N, reward=limits, load=0.0, start="rest")
     env.seed(SEED)
@@ -71,33 +68,18 @@ def test_termination_is_not_called_a_truncation() -> None:
     assert not any(seen)
 
 
-def test_only_ended_rows_have_an_info_of_their_own() -> None:
+def test_only_ended_rows_have_an_info_of_their_own():
     env = make_batch_vec_env(ID, N, **SHORT)
     env.reset()
     for action in actions(30):
         _, _, done, infos = env.step(action)
         for i in range(N):
-            assert (infos[i] is NO_INFO) == (not done[i])
             assert set(infos[i]) == (
                 {"terminal_observation", "TimeLimit.truncated"} if done[i] else set()
             )
 
 
-def test_shared_info_is_read_only() -> None:
-    for write in (
-        lambda: NO_INFO.update(a=1),
-        lambda: NO_INFO.setdefault("a", 1),
-        lambda: NO_INFO.__setitem__("a", 1),
-    ):
-        with pytest.raises(TypeError, match="copy it"):
-            write()
-    own = NO_INFO.copy()
-    own["a"] = 1
-    assert dict(NO_INFO) == {}
-    assert copy.deepcopy(NO_INFO) == {}
-
-
-def test_requested_infos_are_reported_by_row() -> None:
+def test_requested_infos_are_reported_by_row():
     env = make_batch_vec_env(ID, N, info=True, **SHORT)
     env.seed(SEED)
     env.reset()
@@ -113,7 +95,7 @@ def test_requested_infos_are_reported_by_row() -> None:
     assert np.array_equal(infos[2]["terminal_observation"], last)
 
 
-def test_returned_arrays_are_not_overwritten() -> None:
+def test_returned_arrays_are_not_overwritten():
     env = make_batch_vec_env(ID, N, **SHORT)
     env.reset()
     kept = [env.step(action) for action in actions(15)]
@@ -125,7 +107,7 @@ def test_returned_arrays_are_not_overwritten() -> None:
         assert np.array_equal(r, old_r)
 
 
-def test_seeds_repeat_and_unseeded_resets_continue() -> None:
+def test_seeds_repeat_and_unseeded_resets_continue():
     env = make_batch_vec_env(ID, N, **SHORT)
     env.seed(7)
     first, second = env.reset(), env.reset()
@@ -135,7 +117,7 @@ def test_seeds_repeat_and_unseeded_resets_continue() -> None:
     assert np.array_equal(env.reset(), second)
 
 
-def test_monitor_reports_the_return_of_whole_episodes() -> None:
+def test_monitor_reports_the_return_of_whole_episodes():
     env = VecMonitor(make_batch_vec_env(ID, N, **SHORT))
     env.reset()
     total, reported = np.zeros(N), []
@@ -150,22 +132,7 @@ def test_monitor_reports_the_return_of_whole_episodes() -> None:
     assert len(reported) == 2 * N
 
 
-def test_normalisation_reaches_the_terminal_observation() -> None:
-    env = VecNormalize(make_batch_vec_env(ID, N, **SHORT))
-    plain = make_batch_vec_env(ID, N, **SHORT)
-    for made in (env, plain):
-        made.seed(SEED)
-        made.reset()
-    for action in actions(12):
-        _, _, done, infos = env.step(action)
-        _, _, _, raw = plain.step(action)
-    assert done.all()
-    for i in range(N):
-        expected = env.normalize_obs(raw[i]["terminal_observation"])
-        assert np.array_equal(infos[i]["terminal_observation"], expected)
-
-
-def test_attributes_and_methods_are_those_of_the_batch() -> None:
+def test_attributes_and_methods_are_those_of_the_batch():
     env = make_batch_vec_env(ID, N, **SHORT)
     assert env.get_attr("plant", indices=[0, 3]) == [env.batches[0].unwrapped.plant] * 2
     assert len(env.get_attr("signals")) == N
@@ -182,7 +149,7 @@ def test_attributes_and_methods_are_those_of_the_batch() -> None:
         env.get_attr("plant", indices=[9])
 
 
-def test_restored_state_continues_bit_for_bit() -> None:
+def test_restored_state_continues_bit_for_bit():
     env = make_batch_vec_env(ID, N, **SHORT)
     env.seed(SEED)
     env.reset()
@@ -196,13 +163,13 @@ def test_restored_state_continues_bit_for_bit() -> None:
     assert np.array_equal(first, again)
 
 
-def test_other_reset_mode_is_refused() -> None:
+def test_other_reset_mode_is_refused():
     other = SyncVectorEnv([lambda: gym.make(ID)], autoreset_mode=AutoresetMode.NEXT_STEP)
     with pytest.raises(ValueError, match="SAME_STEP"):
         BatchVecEnv(other)
 
 
-def test_rows_cannot_be_reset_with_differing_options() -> None:
+def test_rows_cannot_be_reset_with_differing_options():
     env = make_batch_vec_env(ID, 2, **SHORT)
     env.set_options([{"a": 1}, {}])
     with pytest.raises(ValueError, match="same options"):

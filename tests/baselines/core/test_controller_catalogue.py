@@ -1,11 +1,8 @@
 """Catalogue: names, plants, and controllers added from outside the package."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -15,7 +12,6 @@ from baselines.core.checks import check_controller
 from benchmarks.runs import controllers as benchmarked
 from pam_envs import citations
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
-from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.baselines.conftest import built, make_env, observations_of, rollout
 
 TOY = '''
@@ -55,12 +51,18 @@ ENTRIES = {
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     (tmp_path / "toy.py").write_text(TOY)
     for catalogued in (CONTROLLERS, PUBLISHED):
         monkeypatch.setitem(catalogued, "toy_integrator", None)  # restores the absence afterwards
         del catalogued["toy_integrator"]
     return tmp_path
+
+
+def printed(program: str, **variables: str) -> str:
+    """Return what a program prints in a process of its own."""
+    command, env = [sys.executable, "-c", program], {**os.environ, **variables}
+    return subprocess.run(command, env=env, capture_output=True, text=True, check=True).stdout[:-1]
 
 
 def test_third_party_controller_enters_catalogue_checks_and_benchmark(folder):
@@ -78,55 +80,33 @@ def test_third_party_controller_enters_catalogue_checks_and_benchmark(folder):
 
 
 def test_environment_variable_names_folders_of_controllers(folder):
-    program = (
-        "from baselines.core.catalogue import CONTROLLERS; print('toy_integrator' in CONTROLLERS)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        env={**os.environ, catalogue.VARIABLE: str(folder)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == "True"
-
-
-def test_folder_without_controllers_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="no Python file with ENTRIES"):
-        load(tmp_path)
-
-
-def test_registered_names_are_unique():
-    with pytest.raises(ValueError, match="'pid' is registered already; choose another name"):
-        register("pid", PUBLISHED["pid"])
+    program = "import baselines.core.catalogue as c; print('toy_integrator' in c.CONTROLLERS)"
+    assert printed(program, **{catalogue.VARIABLE: str(folder)}) == "True"
 
 
 def test_catalogue_is_imported_without_python_control_and_cvxpy():
     program = "import sys, baselines.core.catalogue; print({'control', 'cvxpy'} & set(sys.modules))"
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "set()"
-
-
-def test_unknown_name_suggests_the_nearest():
-    with pytest.raises(ValueError, match="did you mean 'pid'"):
-        built("pdi", make_env())
+    assert printed(program) == "set()"
 
 
 @pytest.mark.parametrize(
-    ("name", "plant", "message"),
+    ("make", "message"),
     [
-        ("knee_pid", SingleMuscle.mas10(), "knee_pid is for a KneeOrthosis"),
-        ("elbow_pid", SingleMuscle.mas10(), "elbow_pid is for a ElbowOrthosis"),
-        ("joint_pi", SingleMuscle.mas10(), "for a AntagonisticJoint or RedundantManipulator"),
-        ("joint_inverse_kinematics", AntagonisticJoint.paper(), "is for a RedundantManipulator"),
+        (lambda folder: load(folder / "none"), "no Python file with ENTRIES"),
+        (lambda _: register("pid", PUBLISHED["pid"]), "'pid' is registered already"),
+        (lambda _: built("pdi", make_env()), "did you mean 'pid'"),
+        (lambda _: built("knee_pid", make_env()), "knee_pid is for a KneeOrthosis"),
+        (lambda _: built("elbow_pid", make_env()), "elbow_pid is for a ElbowOrthosis"),
+        (lambda _: built("joint_pi", make_env()), "AntagonisticJoint or RedundantManipulator"),
+        (
+            lambda _: built("joint_inverse_kinematics", make_env(), AntagonisticJoint.paper()),
+            "is for a RedundantManipulator",
+        ),
     ],
 )
-def test_plant_of_another_family_is_refused(name, plant, message):
-    env = make_env()
+def test_wrong_name_folder_or_plant_is_refused(make, message, tmp_path):
     with pytest.raises(ValueError, match=message):
-        make_controller(name, plant, env.signals, env.action_signals)
+        make(tmp_path)
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)

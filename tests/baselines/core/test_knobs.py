@@ -1,7 +1,5 @@
 """Knobs: neutral at 1, effect at other values, bounds, and tuned controllers."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
@@ -40,7 +38,7 @@ PAIRS = [
 
 
 @pytest.fixture(autouse=True)
-def known(monkeypatch: pytest.MonkeyPatch) -> None:
+def known(monkeypatch):
     """Replace what is identified on plants by models that are at hand."""
     monkeypatch.setattr(knee_design, "identify", lambda plant, output: RIG)
     monkeypatch.setattr(knee_design, "_DESIGNS", {})

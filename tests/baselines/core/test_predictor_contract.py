@@ -1,7 +1,5 @@
 """Contract of a policy predictor, over every controller and environment of the catalogue."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

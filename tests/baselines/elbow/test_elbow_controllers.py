@@ -1,7 +1,5 @@
 """Elbow controllers: allocation, friction compensation, valves and PI."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 
@@ -23,7 +21,7 @@ make_elbow = partial(make_env, "PAM/ElbowOrthosis-v0")
 def quiet(hysteresis: str = "maxwell_slip", prompt: bool = False, **how: Any) -> ElbowOrthosis:
     """Return a plant without noise; ``prompt``: whose regulators hardly lag."""
     plant = ElbowOrthosis.paper(hysteresis, **how).without_noise()
-    return plant.replace(PROMPT) if prompt else plant
+    return plant.with_lag_alone().replace(PROMPT) if prompt else plant
 
 
 def torque_error(env: Any, name: str) -> float:
@@ -90,8 +88,8 @@ def test_pid_tracks_the_torque_and_not_the_stiffness():
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
 def test_friction_in_the_estimate_removes_most_of_the_pids_error(hysteresis):
-    env = make_elbow(plant=quiet(hysteresis), reference="free", motion="sines",
-                   episode_seconds=5.0)  # fmt: skip
+    plant = quiet(hysteresis).with_lag_alone()
+    env = make_elbow(plant=plant, reference="free", motion="sines", episode_seconds=5.0)
     assert torque_error(env, "elbow_pid_hysteresis") < 0.4 * torque_error(env, "elbow_pid")
     bare = make_elbow(plant=quiet("none"), reference="free", motion="sines", episode_seconds=1.0)
     records = [rollout(bare, built(n, bare)) for n in ("elbow_pid", "elbow_pid_hysteresis")]
@@ -133,7 +131,8 @@ def test_reachable_pressures_keep_the_torque_during_the_transition(valves):
 
 @pytest.mark.parametrize("valves", VALVES)
 def test_reach_of_the_valves_is_that_of_their_longest_commands(valves):
-    env = make_elbow(plant=quiet("none", valves=valves), motion="still", reference="free")
+    plant = quiet("none", valves=valves).with_lag_alone()
+    env = make_elbow(plant=plant, motion="still", reference="free")
     signals = make_elbow_signal_map(spec_of(env))
     loop, steps = make_pressure_loop(spec_of(env)), 2 if valves == "proportional" else 5
     for sign, side in ((-1.0, 0), (1.0, 1)):

@@ -1,7 +1,5 @@
 """Joint controllers: one joint and many, limits, starts, signals."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

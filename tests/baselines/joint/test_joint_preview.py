@@ -1,7 +1,5 @@
 """Preview of joint references: weights, delays, and tracking error."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Knee controllers: inverse, preview, zero torque, identification, margins, bumpless transfer."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
@@ -12,7 +10,7 @@ from baselines.knee import identification as knee_identification
 from baselines.knee.identification import FREQUENCIES, frequency_response, identify
 from baselines.knee.ltr import BANDWIDTHS, design, make_loop
 from baselines.linear.bumpless import BumplessGains, certificate
-from baselines.linear.systems import state_space
+from baselines.linear.systems import response, state_space
 from benchmarks.scoring.groups.knee import landings
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from tests.baselines.conftest import built, make_env, rms, rollout
@@ -28,7 +26,7 @@ CASES = [
 def quiet(mounting: str, hysteresis: str = "maxwell_slip", prompt: bool = False) -> KneeOrthosis:
     """Return a plant without noise; ``prompt``: whose regulator hardly lags."""
     made = getattr(KneeOrthosis, mounting)(hysteresis=hysteresis).without_noise()
-    return made.replace(PROMPT) if prompt else made
+    return made.with_lag_alone().replace(PROMPT) if prompt else made
 
 
 def make_knee(name: str, **arguments: Any) -> Any:
@@ -43,8 +41,9 @@ def error_of(env: Any, name: str, plant: Any = None) -> np.ndarray:
 
 @cache
 def walked(name: str, mismatch: float) -> dict[str, np.ndarray]:
-    """Return two strides and a bit from heel contact, without noise."""
-    env = make_knee("KneeWalk", plant=quiet("on_leg"), mismatch=mismatch, start="heel_contact",
+    """Return two strides and a bit from heel contact, without noise, with the paper's regulator."""
+    plant = quiet("on_leg").with_lag_alone()
+    env = make_knee("KneeWalk", plant=plant, mismatch=mismatch, start="heel_contact",
                     episode_seconds=6.0)  # fmt: skip
     return rollout(env, built(name, env))
 
@@ -102,12 +101,33 @@ def test_zero_torque_controller_leaves_little_torque_on_the_knee():
 
 @pytest.mark.parametrize(("mounting", "hysteresis", "output"), CASES)
 def test_margins_on_the_identified_plant(mounting, hysteresis, output):
-    made = design(getattr(KneeOrthosis, mounting)(hysteresis=hysteresis), output)
+    plant = getattr(KneeOrthosis, mounting)(hysteresis=hysteresis).with_lag_alone()
+    made = design(plant, output)
     figures = made.sampled_figures(0.01)
     assert figures.phase_margin > np.radians(60.0)
     assert figures.gain_margin > 2.5
     assert figures.peak_sensitivity < 1.7
     assert 0.9 * BANDWIDTHS[output] < figures.bandwidth < 1.25 * BANDWIDTHS[output]
+
+
+@pytest.mark.parametrize(("mounting", "output"), [("rig", "tension"), ("on_leg", "angle")])
+def test_dead_time_limits_the_bandwidth_and_leaves_a_margin(mounting, output):
+    plant = getattr(KneeOrthosis, mounting)()
+    made, late = design(plant, output), plant.regulator.dead_time
+    assert late > 0.04
+    w = np.geomspace(0.1, 300.0, 4000)
+    loop = response(made.plant * made.controller, w) * np.exp(-1j * w * (late + 0.005))
+    crossing = np.flatnonzero((np.abs(loop[:-1]) >= 1.0) & (np.abs(loop[1:]) < 1.0))
+    assert w[crossing[-1]] * late < 0.6
+    assert min(180.0 + np.degrees(np.unwrap(np.angle(loop)))[crossing]) > 40.0
+    assert np.max(1.0 / np.abs(1.0 + loop)) < 2.0
+
+
+def test_setpoint_of_a_loop_changes_no_faster_than_the_pressure():
+    env = make_knee("KneeWalk", plant=quiet("on_leg"), start="heel_contact", episode_seconds=6.0)
+    record = rollout(env, built("knee_inverse_ltr", env))
+    step = quiet("on_leg").regulator.slew_rate * 0.01
+    assert np.abs(np.diff(record["command"])).max() < 1.001 * step
 
 
 def test_published_dynamics_give_the_published_bandwidth():
@@ -151,7 +171,7 @@ def test_loop_started_from_a_command_holds_it():
 
 
 def test_unreachable_reference_causes_no_windup():
-    plant = quiet("rig")
+    plant = quiet("rig").with_lag_alone()
     reference = np.where(np.arange(700) < 400, 390.0, 158.0)  # 4.5 bar give 355 N
     env = make_knee("KneeTension", plant=plant, reference=reference, episode_seconds=7.0)
     record = rollout(env, built("knee_ltr", env))

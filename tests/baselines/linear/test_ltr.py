@@ -1,7 +1,5 @@
 """Loop transfer recovery and linear systems against theory and python-control."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 
@@ -66,11 +64,6 @@ def test_recovered_loop_is_the_target_integrator():
     assert 1.7 < errors[0] / errors[1] < errors[1] / errors[2] < 3.2
 
 
-def test_too_small_a_control_weight_is_refused():
-    with pytest.raises(ValueError, match="too small for the arithmetic"):
-        design_ltr(PLANT, 26.2, 1e-20)
-
-
 def test_design_has_the_published_bandwidth_of_26_2():
     figures = design_ltr(PLANT, 26.2, 1e-10).figures
     assert figures.bandwidth == pytest.approx(26.19, abs=0.015)
@@ -122,16 +115,6 @@ def test_discrete_controller_keeps_integrator_and_response():
     np.testing.assert_allclose(sampled.response(w), controller(1j * w), rtol=0.012)
 
 
-def test_rows_of_a_discrete_system_are_independent():
-    controller = discrete(printed_controller(), 0.01)
-    errors = np.random.default_rng(0).normal(size=(30, 4))
-    rows, one = controller.initial_state(4), controller.initial_state()
-    for error in errors:
-        many, rows = controller.step(error, rows)
-        single, one = controller.step(error[2], one)
-        assert many[2] == pytest.approx(float(single), rel=1e-12, abs=1e-12)
-
-
 def test_rest_state_is_an_equilibrium():
     held = discrete(PLANT, 0.01, "zoh")
     state = held.rest_state(200.0)
@@ -147,12 +130,8 @@ def test_sampling_and_delay_reduce_the_phase_margin():
     assert lost == pytest.approx(0.005 * smooth.crossover, rel=0.1)  # half a period of the hold
     lost = sampled.phase_margin - late.phase_margin
     assert lost == pytest.approx(0.01 * sampled.crossover, rel=1e-3)
-    assert (
-        sampled_figures(
-            PLANT, discrete(design.controller, 0.01), 0.9 * sampled.delay_margin
-        ).bandwidth
-        > 0.0
-    )
+    near = sampled_figures(PLANT, discrete(design.controller, 0.01), 0.9 * sampled.delay_margin)
+    assert near.bandwidth > 0.0
 
 
 def test_sampled_loop_becomes_unstable_at_the_delay_margin():
@@ -192,27 +171,22 @@ def test_controller_from_a_noisy_frequency_response_is_stable_on_the_plant():
 
 
 @pytest.mark.parametrize(
-    ("plant", "bandwidth", "weight", "message"),
+    ("make", "message"),
     [
-        (from_roots([5.0], [-1.0, -2.0], 1.0), 5.0, 1e-4, "zero is at 5"),
-        (from_polynomials([1.0], [1.0, 0.0]), 5.0, 1e-4, "pole has real part"),
-        (from_polynomials([1.0, 2.0], [1.0, 1.0]), 5.0, 1e-4, "strictly proper"),
-        (PLANT, 0.0, 1e-4, "bandwidth is 0.0"),
-        (PLANT, 5.0, -1.0, "control_weight is -1.0"),
+        (lambda: design_ltr(from_roots([5.0], [-1.0, -2.0], 1.0), 5.0, 1e-4), "zero is at 5"),
+        (lambda: design_ltr(from_polynomials([1], [1, 0]), 5.0, 1e-4), "pole has real part"),
+        (lambda: design_ltr(from_polynomials([1, 2], [1, 1]), 5.0, 1e-4), "strictly proper"),
+        (lambda: design_ltr(PLANT, 0.0, 1e-4), "bandwidth is 0.0"),
+        (lambda: design_ltr(PLANT, 5.0, -1.0), "control_weight is -1.0"),
+        (lambda: design_ltr(PLANT, 26.2, 1e-20), "too small for the arithmetic"),
+        (lambda: state_space(np.eye(3), np.ones(2), np.ones(2)), "dimensions of B"),
+        (lambda: from_polynomials([1.0, 2.0, 3.0], [1.0, 1.0]), r"(?i)proper"),
+        (lambda: discrete(PLANT, 0.0), "period is 0"),
     ],
 )
-def test_plants_that_cannot_be_recovered_are_refused(plant, bandwidth, weight, message):
+def test_invalid_systems_and_designs_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
-        design_ltr(plant, bandwidth, weight)
-
-
-def test_invalid_systems_are_refused():
-    with pytest.raises(ValueError):
-        state_space(np.eye(3), np.ones(2), np.ones(2))
-    with pytest.raises(ValueError, match=r"(?i)proper"):
-        from_polynomials([1.0, 2.0, 3.0], [1.0, 1.0])
-    with pytest.raises(ValueError, match="period is 0"):
-        discrete(PLANT, 0.0)
+        make()
 
 
 def test_cost_of_the_regulated_loop_is_the_riccati_solutions():
@@ -225,13 +199,6 @@ def test_cost_of_the_regulated_loop_is_the_riccati_solutions():
     cost = solve_continuous_lyapunov(closed.T, -(q + weight * gain.T @ gain))
     for start in np.eye(augmented.nstates):
         assert start @ cost @ start == pytest.approx(start @ riccati @ start, rel=1e-3)
-
-
-def test_recovered_loop_tends_to_the_phase_margin_of_an_integrator():
-    designs = [design_ltr(PLANT, 26.2, weight) for weight in (1e-6, 1e-10, 1e-14)]
-    phases = [np.degrees(design.figures.phase_margin) for design in designs]
-    assert 60.0 < phases[0] < phases[1] < phases[2] < 90.0
-    assert phases[2] > 79.0
 
 
 def test_margins_are_those_of_the_rational_loop():
@@ -274,9 +241,8 @@ def test_lanes_equal_single_systems():
     state = lanes.rest_state(u)
     np.testing.assert_allclose(lanes.advance(u, state), state, atol=1e-12)
     for k, single in enumerate(singles):
-        np.testing.assert_array_equal(
-            lanes.output(u, state)[:, k], single.output(u[:, k], state[:, k])
-        )
+        own = single.output(u[:, k], state[:, k])
+        np.testing.assert_array_equal(lanes.output(u, state)[:, k], own)
 
 
 def test_residualisation_agrees_with_slicot():

@@ -1,7 +1,5 @@
 """SIMC rule and PID: formulas, limits, loops of joints, closed loop of the muscle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -65,12 +63,7 @@ def test_gains_are_those_of_the_simc_rule():
     assert 0.0 < controller_gain < 0.03  # tau_2, the lag of the mass
     slower = simc(plant, closed_loop_time=3.0 * theta)
     assert slower.integral == pytest.approx(gains.integral / 2.0)
-
-
-def test_gains_are_reproducible_and_fall_with_the_dead_time():
-    plant = SingleMuscle.mas10()
-    assert simc(plant) == simc(SingleMuscle.mas10())
-    assert simc(plant.replace({"regulator.dead_time": 0.1})).integral < simc(plant).integral
+    assert simc(plant.replace({"regulator.dead_time": 0.1})).integral < gains.integral
 
 
 @pytest.mark.parametrize("load", [0.0, 2.55, 4.55])
@@ -93,15 +86,15 @@ def test_formulas_of_the_rule_with_the_dead_time_as_recommendation():
     assert simc_rule(1.0, 0.3, 0.0, 0.02) == simc_rule(1.0, 0.3, 0.0, 0.02, 0.02)
 
 
-def test_closed_loop_of_an_arm_is_at_most_twice_as_fast_as_the_joint():
+def test_closed_loop_is_slower_by_a_lag_in_an_arm_and_by_one_more_where_smooth():
     wait = DELAY_PERIODS * PERIOD
     assert closed_loop_time(POLE, wait, in_arm=False) == wait
-    assert closed_loop_time(5.0, wait, in_arm=True) == pytest.approx(0.1)
-    assert closed_loop_time(50.0, wait, in_arm=True) == wait
-    assert closed_loop_time(POLE, wait, in_arm=False, smooth=True) == 1.0 / POLE
+    assert closed_loop_time(5.0, wait, in_arm=True) == pytest.approx(wait + 0.2)
+    assert closed_loop_time(5.0, wait, in_arm=True, smooth=True) == pytest.approx(wait + 0.4)
+    assert closed_loop_time(POLE, wait, in_arm=False, smooth=True) == wait + 1.0 / POLE
 
 
-@pytest.mark.parametrize(("smooth", "margin", "peak"), [(False, 51.7, 1.86), (True, 70.1, 1.35)])
+@pytest.mark.parametrize(("smooth", "margin", "peak"), [(False, 51.7, 1.86), (True, 74.1, 1.27)])
 def test_loop_of_one_stage_has_margins_with_its_dead_time(smooth, margin, peak):
     """With a whole period of computing, as on a rig; without the filter of D the peak were 1.59."""
     law = simc_joint(1.0, POLE, PERIOD, smooth=smooth)

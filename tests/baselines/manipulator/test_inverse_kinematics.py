@@ -1,7 +1,5 @@
 """Inverse kinematics per period, and plans of a path."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -33,7 +31,7 @@ def set_points(action: np.ndarray) -> np.ndarray:
     return np.array([ACTIONS[k].decode(action) for k in range(6)])
 
 
-def test_setpoints_are_those_of_the_plan() -> None:
+def test_setpoints_are_those_of_the_plan():
     line = PATH.angles()
     poses = ARM.pose(line)
     planned = resolve(ARM, poses, start=line[0])
@@ -46,7 +44,7 @@ def test_setpoints_are_those_of_the_plan() -> None:
     assert state is not None and state.missed[0] == 0
 
 
-def test_previewed_pose_is_the_target() -> None:
+def test_previewed_pose_is_the_target():
     line = PATH.angles()
     poses = ARM.pose(line[:2])
     seen = observation(line[0], poses[0], poses[1])
@@ -55,7 +53,7 @@ def test_previewed_pose_is_the_target() -> None:
     np.testing.assert_allclose(set_points(action), desired, atol=1e-6)
 
 
-def test_rows_of_a_batch_are_independent() -> None:
+def test_rows_of_a_batch_are_independent():
     lines = [path.angles() for path in PATHS]
     poses = [ARM.pose(line) for line in lines]
     follower = make_inverse_kinematics(SPEC, weighted=False)
@@ -69,7 +67,7 @@ def test_rows_of_a_batch_are_independent() -> None:
             np.testing.assert_array_equal(action, actions[i])
 
 
-def test_pose_out_of_reach_keeps_the_setpoints_and_is_counted() -> None:
+def test_pose_out_of_reach_keeps_the_setpoints_and_is_counted():
     line = PATH.angles()
     good, far = ARM.pose(line[0]), np.array([0.0, 0.0, 1.7, 0.0, 0.0, 1.0])
     follower = make_inverse_kinematics(SPEC)
@@ -82,7 +80,7 @@ def test_pose_out_of_reach_keeps_the_setpoints_and_is_counted() -> None:
     assert state.missed[0] == 1
 
 
-def test_weighted_plan_keeps_joints_within_their_limits() -> None:
+def test_weighted_plan_keeps_joints_within_their_limits():
     line = PATH.angles()
     both = compare(ARM, ARM.pose(line), start=line[0])
     assert both.unweighted.peak > LIMIT > both.weighted.peak

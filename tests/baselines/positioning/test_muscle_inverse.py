@@ -1,7 +1,5 @@
 """Exact inverse of the muscle against curves without hysteresis."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

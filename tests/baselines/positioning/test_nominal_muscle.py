@@ -1,7 +1,5 @@
 """The nominal muscle by rows agrees with the plant's own operators."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

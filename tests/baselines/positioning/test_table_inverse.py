@@ -1,7 +1,5 @@
 """Controllers from the published tables, as printed and refitted; selection of the branch."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -79,28 +77,25 @@ def test_first_branch_points_towards_the_reference():
     assert not _taken([5e-3], contraction=8e-3)[0]
 
 
-def test_step_selects_its_branch_at_once_and_keeps_it_while_held():
-    steps = np.repeat([2e-3, 8e-3, 5e-3, 6e-3], 50)
-    expected = np.repeat([True, True, False, True], 50)
-    np.testing.assert_array_equal(_taken(steps), expected)
+STEPS = np.repeat([2e-3, 8e-3, 5e-3, 6e-3], 50)
+RAMP = 5e-3 - 1e-7 * np.arange(2000)  # a thousandth of the dead band a period and below
+NOISY = np.linspace(1e-3, 10e-3, 500)
+NOISY += np.random.default_rng(0).uniform(-0.45, 0.45, 500) * DEAD_BAND
+CREEP = 6e-3 - np.array([0.0, 0.9, 1.2]) * DEAD_BAND
 
 
-def test_slow_ramp_changes_branch_after_the_dead_band():
-    ramp = 5e-3 - 1e-7 * np.arange(2000)  # a thousandth of the dead band a period and below
-    taken = _taken(ramp)
-    assert np.flatnonzero(~taken)[0] == np.flatnonzero(ramp < ramp[0] - DEAD_BAND)[0]
-    assert not taken[-1]
-
-
-def test_small_reversals_and_noise_keep_the_branch():
-    rng = np.random.default_rng(0)
-    rise = np.linspace(1e-3, 10e-3, 500) + rng.uniform(-0.45, 0.45, 500) * DEAD_BAND
-    assert _taken(rise).all()
-
-
-def test_reversal_is_measured_from_the_extremum():
-    creep = np.concatenate([[6e-3, 6e-3 - 0.9 * DEAD_BAND], [6e-3 - 1.2 * DEAD_BAND]])
-    np.testing.assert_array_equal(_taken(creep), [True, True, False])
+@pytest.mark.parametrize(
+    ("reference", "inflating"),
+    [
+        (STEPS, np.repeat([True, True, False, True], 50)),  # at once, and kept while held
+        (RAMP, RAMP[0] - DEAD_BAND <= RAMP),
+        (NOISY, np.full(500, True)),
+        (CREEP, [True, True, False]),  # the reversal is measured from the extremum
+    ],
+    ids=["steps", "ramp", "noise", "reversal"],
+)
+def test_branch_changes_after_the_dead_band(reference, inflating):
+    np.testing.assert_array_equal(_taken(reference), inflating)
 
 
 def test_rows_are_independent_and_the_argument_is_unchanged():

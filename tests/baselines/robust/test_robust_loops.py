@@ -1,7 +1,5 @@
 """Synthesised disturbance loops: robust performance, reduction, reproduction."""
 
-from __future__ import annotations
-
 import importlib.util
 
 import numpy as np
@@ -54,12 +52,6 @@ def test_sensitivity_has_the_documented_values(frequency, size):
     found = np.interp(frequency, FREQUENCIES, sensitivity(_loop("mu")))
     assert found == pytest.approx(size, rel=0.02)
     assert sensitivity(_loop("mu")).max() < 1.07
-
-
-def test_performance_holds_for_every_gain_of_the_sector():
-    performance = np.abs(DESIGN.performance(1j * FREQUENCIES))
-    for gain in np.linspace(0.65, 1.35, 15):
-        assert np.max(performance * sensitivity(gain * _loop("mu"))) < 1.0
 
 
 def test_structured_value_marks_the_worst_plant_that_violates_the_bound():

@@ -1,9 +1,6 @@
 """Rows as they are run and audited, on the board and on the page."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 from benchmarks.board import accessors as views
 from benchmarks.board import leaderboard, site, standings
@@ -14,7 +11,7 @@ from tests.benchmarks.row_helpers import draw, place, run_row
 PAGE = "leaderboard/MusclePositioning.md"
 
 
-def test_board_shows_round_missing_entrants_and_outsiders(tmp_path: Path) -> None:
+def test_board_shows_round_missing_entrants_and_outsiders(tmp_path):
     with place(tmp_path):
         run_row(tmp_path, "middle")
         draw(tmp_path, "trained", "low", "integral")

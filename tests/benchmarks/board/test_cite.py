@@ -1,10 +1,7 @@
 """BibTeX of rows: every method of every controller has its entry."""
 
-from __future__ import annotations
-
 import json
 import re
-from typing import Any
 
 import bench_fakes
 import board_fakes as fakes
@@ -19,7 +16,6 @@ from benchmarks.runs import rows
 from benchmarks.runs.controllers import available
 from benchmarks.runs.provenance import ROOT
 from benchmarks.runs.store import write_record
-from benchmarks.scenarios.scenario import ScenarioSet
 from pam_envs import citations
 from tests.benchmarks.runs.test_harness import options, score
 
@@ -44,20 +40,20 @@ ENTRY = r"(@.*\n)((?:  [a-z]+ = \{.*\},\n)+)\}\n"
 
 
 @pytest.mark.parametrize("name", sorted(available()))
-def test_every_method_of_every_controller_has_its_entry(name: str) -> None:
+def test_every_method_of_every_controller_has_its_entry(name):
     citation = available()[name].citation
     found = cite.methods(citation)
     assert bool(found) == bool(citation)
 
 
-def test_entries_are_bibtex() -> None:
+def test_entries_are_bibtex():
     for key, entry in citations.entries().items():
         (found,) = parsed(entry).values()
         assert set(found) - {"type"} == set(citations.fields(key))
         assert found["type"] in ("article", "inproceedings", "book", "misc")
 
 
-def test_method_without_an_entry_is_refused() -> None:
+def test_method_without_an_entry_is_refused():
     assert cite.methods(f"{SIMC}; {PPO}; {SIMC}") == ["skogestad2003", "schulman2017"]
     assert cite.methods("") == []
     assert cite.methods("skogestad2003; schulman2017") == ["skogestad2003", "schulman2017"]
@@ -65,12 +61,12 @@ def test_method_without_an_entry_is_refused() -> None:
         cite.methods(f"{SIMC}; N. N., A method")
 
 
-def test_special_letters_are_escaped() -> None:
+def test_special_letters_are_escaped():
     entry = cite.entry("key", {"type": "misc", "title": "50 % of A_b & C"})
     assert r"title = {{50 \% of A\_b \& C}}" in entry
 
 
-def test_package_is_cited_by_its_own_file() -> None:
+def test_package_is_cited_by_its_own_file():
     about = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     (entry,) = parsed(cite.package()).values()
     assert entry["type"] == "software"
@@ -78,9 +74,7 @@ def test_package_is_cited_by_its_own_file() -> None:
     assert entry["title"] == f"{{{about['title']}}}"
 
 
-def test_row_is_cited_with_its_identity_and_command(
-    track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_row_is_cited_with_its_identity_and_command(track, folder, capsys):
     (path,) = score(track, folder, "integral").rows
     row = rows.load(path)
     row["controller"]["citation"] = f"{PPO}; {SIMC}"
@@ -100,9 +94,7 @@ def test_row_is_cited_with_its_identity_and_command(
     assert rows.path_of("short--integral", options(folder).out) == path
 
 
-def test_author_is_that_of_the_catalogue(
-    track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str], monkeypatch: Any
-) -> None:
+def test_author_is_that_of_the_catalogue(track, folder, capsys, monkeypatch):
     people = "Doe, J. and Roe, R."
     entry = Entry("with an integrator", "nominal model", make_constant, author=people)
     monkeypatch.setitem(bench_fakes.CONTROLLERS, "integral", entry)
@@ -112,7 +104,7 @@ def test_author_is_that_of_the_catalogue(
     assert first["author"] == "{Doe, J. and Roe, R.}"
 
 
-def test_row_is_cited_with_score_round_and_author() -> None:
+def test_row_is_cited_with_score_round_and_author():
     row = fakes.row("pid", 2e-3, audit=2.6e-3)
     said = parsed(cite.bibtex(row | {"controller": row["controller"] | {"citation": ""}}))
     entry = said["short_nominal--pid-aaaaaaaa"]
@@ -124,7 +116,7 @@ def test_row_is_cited_with_score_round_and_author() -> None:
     assert "audit round 2, salt 5a17" in entry["note"]
 
 
-def test_braces_in_a_text_do_not_leave_their_field() -> None:
+def test_braces_in_a_text_do_not_leave_their_field():
     row = fakes.row("pid", 2e-3)
     row["controller"]["author"] = r"A. B}}, note = {won} \input{x}"
     row["controller"]["citation"] = ""
@@ -133,9 +125,7 @@ def test_braces_in_a_text_do_not_leave_their_field() -> None:
     assert entry["note"].startswith("RMS")
 
 
-def test_show_row_prints_scores_and_every_digit(
-    track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_show_row_prints_scores_and_every_digit(track, folder, capsys):
     (path,) = score(track, folder, "integral").rows
     assert main(["show-row", str(path)]) == 0
     text = capsys.readouterr().out

@@ -1,7 +1,5 @@
 """Claims of rows, and each condition that prevents one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import board_fakes as fakes
@@ -33,13 +31,11 @@ def in_round(*rows: dict[str, Any]) -> list[dict[str, Any]]:
 
 def verdict(row: dict[str, Any], paper: dict[str, Any] = PAPER) -> tuple[str, str]:
     found = claims.claim(row, paper)
-    assert found is not None
     return found.verdict, "; ".join(found.reasons)
 
 
-def test_ten_seeds_with_lower_error_at_no_higher_cost_are_better() -> None:
+def test_ten_seeds_with_lower_error_at_no_higher_cost_are_better():
     found = claims.claim(learned(), PAPER)
-    assert found is not None
     assert (found.verdict, found.reasons) == (claims.BETTER, ())
     assert found.split == "audit"
     assert found.probability.value == 1.0
@@ -54,13 +50,11 @@ def test_ten_seeds_with_lower_error_at_no_higher_cost_are_better() -> None:
         ({"constraint_cost": 0.012}, "constraint cost 1.20x"),
     ],
 )
-def test_lower_error_at_higher_cost_has_its_own_verdict(
-    changes: dict[str, float], words: str
-) -> None:
+def test_lower_error_at_higher_cost_has_its_own_verdict(changes, words):
     assert verdict(learned(**changes)) == (claims.DEARER, words)
 
 
-def test_cost_ratio_up_to_1_1_is_allowed() -> None:
+def test_cost_ratio_up_to_1_1_is_allowed():
     assert verdict(learned(travel=1.0999e5))[0] == claims.BETTER
 
 
@@ -74,13 +68,13 @@ def test_cost_ratio_up_to_1_1_is_allowed() -> None:
         (learned(TEN * 3), "P 0.00, needs more than 0.95"),
     ],
 )
-def test_conditions_that_prevent_a_claim(row: dict[str, Any], words: str) -> None:
+def test_conditions_that_prevent_a_claim(row, words):
     found, reasons = verdict(row)
     assert found == claims.NOT_SHOWN
     assert words in reasons
 
 
-def test_lower_error_in_most_episodes_but_not_in_mean_is_not_better() -> None:
+def test_lower_error_in_most_episodes_but_not_in_mean_is_not_better():
     many = learned(np.full(40, 0.9e-3))
     one = [episode for episode in many["episodes"] if episode["training_seed"] == 0]
     for episode in one:
@@ -89,23 +83,21 @@ def test_lower_error_in_most_episodes_but_not_in_mean_is_not_better() -> None:
     assert (found, reasons) == (claims.NOT_SHOWN, "lower in most episodes, not in the mean")
 
 
-def test_gain_whose_interval_contains_zero_is_not_better() -> None:
+def test_gain_whose_interval_contains_zero_is_not_better():
     found = claims.claim(learned([*np.full(39, 0.99e-3), 1.2e-3]), PAPER)
-    assert found is not None
     assert found.probability.value > claims.PROBABILITY
     assert found.gain.low < 0.0 < found.gain.value
     assert found.reasons == ("the interval of the mean's gain holds zero",)
 
 
-def test_gain_is_relative_to_the_paper_controllers_mean() -> None:
+def test_gain_is_relative_to_the_paper_controllers_mean():
     found = claims.claim(learned(np.full(10, 0.75e-3)), PAPER)
-    assert found is not None
     assert found.gain.value == pytest.approx(0.25)
     assert found.gain.low <= found.gain.value <= found.gain.high
 
 
 @pytest.mark.parametrize("knows", [knowledge.TRUE, knowledge.TRAINED])
-def test_row_that_knows_the_plant_is_not_better_than_one_with_another_model(knows: str) -> None:
+def test_row_that_knows_the_plant_is_not_better_than_one_with_another_model(knows):
     found, reasons = verdict(learned(knowledge=knows))
     assert found == claims.NOT_SHOWN
     assert "that differs from the model of inverse" in reasons
@@ -118,11 +110,10 @@ def test_row_that_knows_the_plant_is_not_better_than_one_with_another_model(know
     ("trials", "words"),
     [(60, "settings tried: 60, paper's 0"), (None, "tried: by hand, paper's 0")],
 )
-def test_unequal_budgets_are_shown_beside_the_verdict(trials: int | None, words: str) -> None:
+def test_unequal_budgets_are_shown_beside_the_verdict(trials, words):
     row = learned()
     row["controller"]["tuning"] = {"trials": trials, "how": "search"}
     found = claims.claim(row, PAPER)
-    assert found is not None
     assert found.verdict == claims.BETTER
     assert words in full_verdict(found)
 
@@ -146,7 +137,7 @@ GROUND = {
 
 
 @pytest.mark.parametrize("kind", GROUND)
-def test_row_selected_on_public_episodes_gains_no_claim(kind: str) -> None:
+def test_row_selected_on_public_episodes_gains_no_claim(kind):
     changes, words = GROUND[kind]
     row = learned(**changes)
     if "hair" in kind:  # as good as the paper controller, with the scatter that episodes have
@@ -167,27 +158,27 @@ def test_row_selected_on_public_episodes_gains_no_claim(kind: str) -> None:
         assert [str(place) for place in places] == ["1=", "1="]
 
 
-def test_failures_on_public_episodes_do_not_count_in_audit() -> None:
+def test_failures_on_public_episodes_do_not_count_in_audit():
     unlucky = learned(public=TEN * 4, audit=TEN, failed=3)
     (found,) = claims.learned_claims(in_round(PAPER, unlucky))
     assert found.verdict == claims.BETTER
 
 
-def test_without_a_round_nothing_is_better() -> None:
+def test_without_a_round_nothing_is_better():
     paper = fakes.row("inverse", 1e-3)
     (found,) = claims.learned_claims([paper, learned(audit=None)])
     assert (found.verdict, found.split) == (claims.NOT_SHOWN, "public")
     assert found.reasons[0] == "not audited"
 
 
-def test_better_paper_controller_outside_the_round_prevents_claims() -> None:
+def test_better_paper_controller_outside_the_round_prevents_claims():
     outside = fakes.row("inverse", 1e-3, constraint_cost=0.01, air_use=1e-5)
     (found,) = claims.learned_claims(in_round(learned(audit=2.5e-3), outside))
     assert found.verdict == claims.NOT_SHOWN
     assert "inverse not audited" in found.reasons
 
 
-def test_paper_controller_without_audit_is_still_compared() -> None:
+def test_paper_controller_without_audit_is_still_compared():
     outside = fakes.row("inverse", 0.1e-3)
     pid = fakes.row("pid", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)
     (found,) = claims.learned_claims(in_round(pid, outside, learned()))
@@ -198,7 +189,7 @@ def test_paper_controller_without_audit_is_still_compared() -> None:
     assert found.verdict == claims.BETTER
 
 
-def test_round_entrant_without_row_prevents_claims() -> None:
+def test_round_entrant_without_row_prevents_claims():
     rows = in_round(PAPER, learned())
     for row in rows:
         row["audit"]["entrants"]["lost"] = "b" * 64
@@ -206,7 +197,7 @@ def test_round_entrant_without_row_prevents_claims() -> None:
     assert found.reasons == ("lost is in the audit round and has no row",)
 
 
-def test_negligible_constraint_cost_counts_as_none() -> None:
+def test_negligible_constraint_cost_counts_as_none():
     clean = fakes.row("inverse", 1e-3, constraint_cost=0.0)
 
     def ratio(cost: float) -> float:
@@ -217,7 +208,7 @@ def test_negligible_constraint_cost_counts_as_none() -> None:
     assert ratio(0.1) == pytest.approx(100.0)
 
 
-def test_best_paper_controller_is_classical_with_source() -> None:
+def test_best_paper_controller_is_classical_with_source():
     rows = [
         fakes.row("trivial", 0.1e-3, citation=""),
         learned(),
@@ -225,13 +216,12 @@ def test_best_paper_controller_is_classical_with_source() -> None:
         fakes.row("inverse", 1e-3),
     ]
     found = claims.best_paper(rows)
-    assert found is not None
     assert views.name_of(found) == "inverse"
     assert claims.best_paper(rows[:2]) is None
     assert claims.learned_claims(rows[:2]) == []
 
 
-def test_claims_are_ordered_by_verdict_audit_and_probability() -> None:
+def test_claims_are_ordered_by_verdict_audit_and_probability():
     worse, outside = learned(TEN * 3), learned(audit=None)
     worse["controller"]["name"], outside["controller"]["name"] = "sac", "td3"
     found = claims.learned_claims(in_round(worse, outside, PAPER, learned()))

@@ -1,10 +1,8 @@
 """LEADERBOARD.md and its pages: summary, narrow tables, equal bytes for equal rows."""
 
-from __future__ import annotations
-
 import json
 import re
-from pathlib import Path
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,13 +14,14 @@ from benchmarks.board import claims, format, leaderboard, plots, standings, summ
 from benchmarks.board.format import duration, number, table
 from benchmarks.identity import audit
 from benchmarks.runs import rows
-from benchmarks.scoring.metrics import columns_of, of_track
+from benchmarks.scoring.group import Column
+from benchmarks.scoring.metrics import GROUPS, columns_of, of_track
 
 BOARD, PAGE = leaderboard.BOARD.name, "leaderboard/MusclePositioning.md"
 
 
 @pytest.fixture(scope="module")
-def files() -> dict[str, str]:
+def files():
     return leaderboard.files(fakes.board())
 
 
@@ -41,7 +40,7 @@ def cells_of(text: str, name: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
 
 
-def test_files_do_not_depend_on_order_and_machine(files: dict[str, str]) -> None:
+def test_files_do_not_depend_on_order_and_machine(files):
     turned = fakes.board()[::-1]
     for row in turned:
         times = {"predict_us": {"median": 1e9, "p99": 1e9}, "machine": "x", "date": "y"}
@@ -51,11 +50,11 @@ def test_files_do_not_depend_on_order_and_machine(files: dict[str, str]) -> None
     assert made.keys() == files.keys()
 
 
-def test_summary_shows_winner_and_verdict_of_each_nominal_track(files: dict[str, str]) -> None:
+def test_summary_shows_winner_and_verdict_of_each_nominal_track(files):
     nominal = section(files[BOARD], "Nominal tracks")
     (line,) = re.findall(r"^\| `Muscle.*$", nominal, re.MULTILINE)
     cells = [cell.strip() for cell in line.strip("|").split("|")]
-    assert cells[1:3] == ["`inverse`<br>1.00 mm", "`ppo`<br>0.500 mm"]
+    assert cells[1:3] == ["`inverse`<br>`ppo`", "1.00 mm<br>0.500 mm"]
     assert cells[3:] == ["+50 %", "1.00", "**better**"]
     (detail,) = re.findall(r"^- `MusclePositioning`, audit episodes: .*$", nominal, re.MULTILINE)
     assert "`ppo` 0.500 [" in detail
@@ -63,7 +62,56 @@ def test_summary_shows_winner_and_verdict_of_each_nominal_track(files: dict[str,
     assert detail.endswith("; better (settings tried: 40, paper's 0)")
 
 
-def test_rank_changes_are_in_summary_and_page(files: dict[str, str]) -> None:
+def nominal_tables(files: dict[str, str]) -> dict[str, tuple[list[str], list[str]]]:
+    """Return heading and cells of each environment's line among the nominal tracks."""
+    found: dict[str, tuple[list[str], list[str]]] = {}
+    heading: list[str] = []
+    for line in section(files[BOARD], "Nominal tracks").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split(" | ")]
+        if cells[0] == "environment":
+            heading = cells
+        elif line.startswith("| `"):
+            found[cells[0].strip("`")] = heading, cells
+    return found
+
+
+def test_declared_headline_is_beside_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = leaderboard.files(fakes.board() + fakes.gait())
+    found = nominal_tables(made)
+    assert found["MusclePositioning"][0][2:4] == ["RMS", "lower by"]
+    heading, cells = found["KneeWalk"]
+    assert heading[2:5] == ["RMS", "EMG effort", "lower by"]
+    assert cells[1:4] == ["`pid`<br>`ppo`", "2.00 mm<br>1.50 mm", "0.960<br>0.920"]
+    assert re.search(r"`pid` 2\.00 \[.*?\] mm, EMG effort 0\.960 \[0\.9\d+, 0", made[BOARD])
+
+    def change(name: str, headline: tuple[Column, ...]) -> None:
+        monkeypatch.setitem(GROUPS, name, replace(GROUPS[name], headline=headline))
+
+    change("gait", ())
+    assert nominal_tables(leaderboard.files(fakes.gait()))["KneeWalk"][0][2:4] == [
+        "RMS",
+        "lower by",
+    ]
+    change("range", (("air_use", "air [mg/s]", 1e6),))
+    heading, cells = nominal_tables(leaderboard.files(fakes.gait()))["KneeWalk"]
+    assert heading[2:5] == ["RMS", "air [mg/s]", "lower by"]
+    assert cells[3] == "30.0<br>30.0"
+
+
+def test_first_ranking_table_has_error_and_declared_headline() -> None:
+    text = leaderboard.files(fakes.gait())["leaderboard/KneeWalk.md"]
+    ranks = text.partition("| rank |")[2].partition("<details>")[0]
+    assert ranks.startswith(" controller | audit RMS [mm] [95 %] | EMG effort [95 %] |")
+    efforts = {name: cells_of(ranks, name)[0][3] for name in ("ppo", "pid")}
+    for name, mean in (("ppo", 0.92), ("pid", 0.96)):
+        value, low, high = (float(x.strip(",[]")) for x in efforts[name].split(" "))
+        assert low < value == mean < high < low + 0.03
+    costs = text.partition("Public episodes, smooth")[2].partition("</details>")[0]
+    assert "air [mg/s]" in costs
+    assert "EMG effort" not in costs
+
+
+def test_rank_changes_are_in_summary_and_page(files):
     changes = section(files[BOARD], "Rank changes between tracks")
     assert "| `MusclePositioning` | wrong model | `ppo` | 1 | 0.67 | audit |" in changes
     changes = section(files[PAGE], "Rank changes between tracks")
@@ -72,7 +120,7 @@ def test_rank_changes_are_in_summary_and_page(files: dict[str, str]) -> None:
     assert "| `inverse` | 2 | 3 (▼1) |" in changes
 
 
-def test_rows_outside_the_round_and_with_few_seeds_are_apart(files: dict[str, str]) -> None:
+def test_rows_outside_the_round_and_with_few_seeds_are_apart(files):
     track = files[PAGE].split("\n## A short track\n")[1]
     assert "Audit round 2, drawn 2026-01-02: 6 episodes with seeds unknown before, 5 of 6" in track
     ranked, _, rest = track.partition("Not ranked, fewer than 5 training seeds:")
@@ -88,7 +136,7 @@ def test_rows_outside_the_round_and_with_few_seeds_are_apart(files: dict[str, st
     assert "P(improvement), public episodes" in outside
 
 
-def test_row_with_higher_audit_error_is_marked(files: dict[str, str]) -> None:
+def test_row_with_higher_audit_error_is_marked(files):
     track = files[PAGE].split("\n## A short track\n")[1]
     line = cells_of(track, "pid")[0]
     assert line[0] == "3"
@@ -98,7 +146,7 @@ def test_row_with_higher_audit_error_is_marked(files: dict[str, str]) -> None:
     assert cells_of(public, "pid")[0][2] == "2.00"
 
 
-def test_no_table_is_wider_than_a_screen(files: dict[str, str]) -> None:
+def test_no_table_is_wider_than_a_screen(files):
     made = "\n".join(format.tables(["controller", *("x" * 20,) * 9], [["`a`", *"123456789"]] * 3))
     assert made.count("| controller |") == 2
     for text in (made, *(text for name, text in files.items() if name.endswith(".md"))):
@@ -106,7 +154,7 @@ def test_no_table_is_wider_than_a_screen(files: dict[str, str]) -> None:
             assert not line.startswith("|") or max(map(len, line.split("<br>"))) <= format.WIDTH
 
 
-def test_committed_summary_is_short() -> None:
+def test_committed_summary_is_short():
     assert leaderboard.BOARD.stat().st_size <= 60_000
     pages = sorted((leaderboard.BOARD.parent / leaderboard.PAGES).glob("*.md"))
     assert len(pages) > 9
@@ -114,19 +162,19 @@ def test_committed_summary_is_short() -> None:
     assert set(links) == {f"{leaderboard.PAGES}/{path.name}" for path in pages}
 
 
-def test_second_artefact_of_a_name_is_marked() -> None:
+def test_second_artefact_of_a_name_is_marked():
     row = fakes.row("pid", 1e-3, audit=1e-3)
     assert "(artefact" not in page(row)
     row["audit"]["entry"] = 3
     assert "(artefact 3)" in page(row)
 
 
-def test_entrant_of_the_round_without_row_is_named() -> None:
+def test_entrant_of_the_round_without_row_is_named():
     text = page(fakes.row("pid", 1e-3, audit=1e-3))
     assert "In the round and without a row: inverse, ppo, young, zero." in text
 
 
-def test_verified_row_shows_its_day() -> None:
+def test_verified_row_shows_its_day():
     row = fakes.row("pid", 1e-3)
     assert "not verified yet" in page(row)
     assert "0 of 1 rows are verified.\n" in summary.board_text([row])
@@ -139,9 +187,7 @@ def test_verified_row_shows_its_day() -> None:
     assert ", 1 of them within tolerance on another machine." in summary.verified_words([row])
 
 
-def test_row_of_an_older_round_is_self_reported(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_row_of_an_older_round_is_self_reported(monkeypatch, tmp_path):
     given = [fakes.row("pid", 1e-3, audit=1e-3), fakes.row("zero", 2e-3, audit=2e-3)]
     last = SimpleNamespace(entrants={"pid": "a" * 64})
     monkeypatch.setattr(rows, "load_all", lambda folder: given)
@@ -153,9 +199,7 @@ def test_row_of_an_older_round_is_self_reported(
     assert [views.name_of(r) for r in standings.listing([pid, zero]).outside] == ["zero"]
 
 
-def test_verification_counts_only_for_the_row_with_its_checksum(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_verification_counts_only_for_the_row_with_its_checksum(monkeypatch, tmp_path):
     given = [fakes.row("pid", 1e-3), fakes.row("zero", 2e-3)]
     monkeypatch.setattr(rows, "load_all", lambda folder: given)
     entry = {"checksum": "e" * 64, "date": "2026-01-03", "mode": "bits"}
@@ -165,14 +209,14 @@ def test_verification_counts_only_for_the_row_with_its_checksum(
     assert words == ["verified 2026-01-03", "not verified yet"]
 
 
-def test_board_without_rows_has_a_message(tmp_path: Path) -> None:
+def test_board_without_rows_has_a_message(tmp_path):
     written = leaderboard.write(tmp_path, tmp_path / "LEADERBOARD.md")
     assert summary.NO_ROWS in written[0].read_text()
     with pytest.raises(ValueError, match="no such folder of rows"):
         leaderboard.write(tmp_path / "nowhere", tmp_path / "LEADERBOARD.md")
 
 
-def test_tuning_and_training_costs_are_shown(files: dict[str, str]) -> None:
+def test_tuning_and_training_costs_are_shown(files):
     costs = section(files[PAGE], "Tuning and training")
     assert "As stated by the author of the row, not verified" in costs
     assert "| `ppo` | learned | search of 40 | 40 | 10 | 1 M | 5.00 min | 2 cores |" in costs
@@ -181,7 +225,7 @@ def test_tuning_and_training_costs_are_shown(files: dict[str, str]) -> None:
     assert unequal in files[BOARD]
 
 
-def test_secondary_tables_are_folded(files: dict[str, str]) -> None:
+def test_secondary_tables_are_folded(files):
     text = files[PAGE]
     opened = re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
     assert "| p95 [mm]" in text
@@ -190,19 +234,19 @@ def test_secondary_tables_are_folded(files: dict[str, str]) -> None:
     assert text.count("<details>") == text.count("</details>") == 11
 
 
-def test_controllers_name_their_sources(files: dict[str, str]) -> None:
+def test_controllers_name_their_sources(files):
     assert "- `pid`: what pid is (skogestad2003)\n" in section(files[PAGE], "Controllers")
     assert "- skogestad2003: Skogestad, Sigurd, Simple" in section(files[PAGE], "Sources")
 
 
-def test_rows_of_a_track_without_audit_are_self_reported() -> None:
+def test_rows_of_a_track_without_audit_are_self_reported():
     text = page(fakes.row("pid", 1e-3), fakes.row("zero", 2e-3))
     assert "Self-reported: no audit round yet" in text
     board = summary.board_text([fakes.row("pid", 1e-3), fakes.row("zero", 2e-3)])
     assert "no learned controller has been run" in board
 
 
-def test_figure_is_deterministic() -> None:
+def test_figure_is_deterministic():
     ordered = standings.tracks(fakes.board())["short_nominal"]
     first = plots.track_figure(ordered)
     assert plots.track_figure(ordered) == first
@@ -211,7 +255,7 @@ def test_figure_is_deterministic() -> None:
     assert "outside" not in first
 
 
-def test_all_learned_and_only_the_best_classical_controllers_are_drawn() -> None:
+def test_all_learned_and_only_the_best_classical_controllers_are_drawn():
     many = [fakes.row(f"c{k:02}", 1e-3 * (k + 1)) for k in range(12)]
     worst = fakes.row("ppo", [0.1] * 5, kind="learned")
     drawn = plots.drawn_rows(standings.ordered([*many, worst]))
@@ -219,14 +263,14 @@ def test_all_learned_and_only_the_best_classical_controllers_are_drawn() -> None
     assert drawn[-1]["controller"]["name"] == "ppo"
 
 
-def test_every_cost_of_a_claim_is_a_column() -> None:
+def test_every_cost_of_a_claim_is_a_column():
     for metrics in ([], ["range"], ["range", "gait"]):
         columns = columns_of({"metrics": metrics})
         expected = set(claims.COSTS) & set(of_track({"metrics": metrics}))
         assert expected <= {metric for metric, _, _ in columns}
 
 
-def test_numbers_and_tables_are_formatted() -> None:
+def test_numbers_and_tables_are_formatted():
     assert [number(x) for x in (0.0, 1.0, 0.012345, 123456.0, 2e-5, None)] == [
         "0", "1.00", "0.0123", "123456", "2e-05", "-",
     ]  # fmt: skip

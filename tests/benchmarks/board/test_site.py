@@ -1,7 +1,5 @@
 """Site: equal bytes for equal rows, and interaction in a real browser."""
 
-from __future__ import annotations
-
 import html
 import json
 import re
@@ -19,7 +17,6 @@ from benchmarks.runs import rows, traces
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
 from benchmarks.runs.store import write_json
-from benchmarks.scenarios.scenario import ScenarioSet
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 BROWSER = next((path for path in map(shutil.which, BROWSERS) if path), None)
@@ -42,7 +39,7 @@ def page_rows() -> list[dict[str, Any]]:
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(tmp_path_factory):
     """Folder with the page of the fakes."""
     out = tmp_path_factory.mktemp("page")
     for name, text in site.page(page_rows()).items():
@@ -63,7 +60,7 @@ def browse(address: str, folder: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def seen(built: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def seen(built, tmp_path_factory):
     """Observations of the browser's driver after each click on the page."""
     copy = tmp_path_factory.mktemp("driven")
     shutil.copytree(built, copy, dirs_exist_ok=True)
@@ -84,14 +81,14 @@ ORDER = ["ppo", "inverse", "pid", "zero", "young", "outside"]
 
 
 @needs_browser
-def test_page_is_valid_and_loads_only_local_files(seen: dict[str, Any]) -> None:
+def test_page_is_valid_and_loads_only_local_files(seen):
     assert seen["faults"] == []
     assert {"page.css", "board.js", "page.js"} <= {Path(name).name for name in seen["loaded"]}
     assert all(name.startswith("file:") for name in seen["loaded"])
 
 
 @needs_browser
-def test_verdicts_and_rank_changes_are_shown(seen: dict[str, Any]) -> None:
+def test_verdicts_and_rank_changes_are_shown(seen):
     assert "inverse" in seen["winners"]
     assert seen["winners"].endswith("better (settings tried: 40, paper's 0)")
     assert "inverse 2 → 3" in seen["changes"]
@@ -99,7 +96,7 @@ def test_verdicts_and_rank_changes_are_shown(seen: dict[str, Any]) -> None:
 
 
 @needs_browser
-def test_rows_are_in_their_groups_with_intervals(seen: dict[str, Any]) -> None:
+def test_rows_are_in_their_groups_with_intervals(seen):
     assert seen["first"] == ORDER
     assert seen["groups"] == [title for title in site.GROUPS.values() if title]
     assert seen["intervals"] == len(ORDER) - 1
@@ -107,14 +104,14 @@ def test_rows_are_in_their_groups_with_intervals(seen: dict[str, Any]) -> None:
 
 
 @needs_browser
-def test_headings_name_episodes_and_unverified_columns(seen: dict[str, Any]) -> None:
+def test_headings_name_episodes_and_unverified_columns(seen):
     expected = ["audit RMS [mm] [95 %]", "IQM [mm]", "public RMS [mm]", "audit - public [mm]"]
     expected += ["P(improvement), audit episodes", "step [µs] *", "trained [steps] *"]
     assert set(expected) <= set(seen["headings"])
 
 
 @needs_browser
-def test_heading_click_sorts_within_groups_up_down_and_resets(seen: dict[str, Any]) -> None:
+def test_heading_click_sorts_within_groups_up_down_and_resets(seen):
     assert seen["up"] == ["inverse", "pid", "ppo", "zero", "young", "outside"]
     assert seen["down"] == ["zero", "ppo", "pid", "inverse", "young", "outside"]
     assert seen["none"] == ORDER
@@ -122,7 +119,7 @@ def test_heading_click_sorts_within_groups_up_down_and_resets(seen: dict[str, An
 
 
 @needs_browser
-def test_filters_keep_matching_rows(seen: dict[str, Any]) -> None:
+def test_filters_keep_matching_rows(seen):
     assert seen["kinds"] == ["inverse", "pid", "zero", "ppo", "young", "outside"]
     assert seen["nothing"] == ["zero"]
     assert seen["reported"] == ["outside"]
@@ -132,7 +129,7 @@ def test_filters_keep_matching_rows(seen: dict[str, Any]) -> None:
 
 
 @needs_browser
-def test_click_opens_trajectories_loop_and_commands(seen: dict[str, Any]) -> None:
+def test_click_opens_trajectories_loop_and_commands(seen):
     assert "row=short_nominal--pid" in seen["address"]
     assert seen["charts"] == 4
     # two errors, two loops, one pressure; reference, output, and the paper controller's output
@@ -149,7 +146,7 @@ def test_click_opens_trajectories_loop_and_commands(seen: dict[str, Any]) -> Non
 
 
 @needs_browser
-def test_learned_row_shows_every_training_seed(seen: dict[str, Any]) -> None:
+def test_learned_row_shows_every_training_seed(seen):
     assert "RMS [mm] by training seed, audit episodes" in seen["learned"]
     assert "seed 00.400" in seen["learned"]
     assert "seed 90.600" in seen["learned"]
@@ -157,18 +154,18 @@ def test_learned_row_shows_every_training_seed(seen: dict[str, Any]) -> None:
 
 
 @needs_browser
-def test_missing_trajectories_are_reported(seen: dict[str, Any]) -> None:
+def test_missing_trajectories_are_reported(seen):
     assert seen["missing"].startswith("data/traces/short_nominal--zero.js cannot be read")
 
 
 @needs_browser
-def test_texts_of_rows_are_shown_and_never_run(seen: dict[str, Any]) -> None:
+def test_texts_of_rows_are_shown_and_never_run(seen):
     assert HOSTILE in seen["hostile"]
     assert not seen["taken"]
 
 
 @needs_browser
-def test_address_opens_a_row(built: Path) -> None:
+def test_address_opens_a_row(built):
     address = f"{(built / 'index.html').as_uri()}#row=short_wrong_model--ppo"
     shown = browse(address, built)
     assert 'class="pictures"' in shown
@@ -176,13 +173,13 @@ def test_address_opens_a_row(built: Path) -> None:
 
 
 @needs_browser
-def test_page_without_rows_has_a_message(tmp_path: Path) -> None:
+def test_page_without_rows_has_a_message(tmp_path):
     site.build(tmp_path, tmp_path / "out")
     shown = browse((tmp_path / "out" / "index.html").as_uri(), tmp_path)
     assert "There are no rows yet" in shown
 
 
-def test_equal_rows_give_an_equal_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_equal_rows_give_an_equal_page(tmp_path, monkeypatch):
     made = {"rows": page_rows()}
     monkeypatch.setattr(leaderboard, "load", lambda folder: made["rows"])
     for row in made["rows"]:
@@ -203,7 +200,24 @@ def test_equal_rows_give_an_equal_page(tmp_path: Path, monkeypatch: pytest.Monke
         assert left == {f"short_nominal--{n}.{end}" for n in ("inverse", "pid", "zero", "outside")}
 
 
-def test_page_loads_nothing_from_the_network() -> None:
+def test_declared_headline_has_columns_with_intervals() -> None:
+    made = site.board(fakes.board() + fakes.gait())
+    tracks = {track["name"]: track for track in made["tracks"]}
+    plain, walk = tracks["short_nominal"], tracks["walk_nominal"]
+    assert plain["headlines"] == []
+    assert {len(row["headlines"]) for row in plain["rows"]} == {0}
+    assert walk["headlines"] == ["EMG effort"]
+    assert "EMG effort" not in [walk["columns"][k] for k in walk["costs"]]
+    for row in walk["rows"]:
+        ((value, low, high),) = row["headlines"]
+        assert value == pytest.approx({"pid": 0.96, "ppo": 0.92}[row["controller"]])
+        assert low < value < high
+    winner = next(entry for entry in made["winners"] if entry["track"] == "walk_nominal")
+    assert list(winner["paper_scores"]) == list(winner["learned_scores"]) == ["RMS", "EMG effort"]
+    assert winner["learned_scores"]["EMG effort"].startswith("0.920 [0.9")
+
+
+def test_page_loads_nothing_from_the_network():
     for path in site.ASSETS.iterdir():
         links = re.findall(r"https?://[^\s\"']+", path.read_text())
         assert set(links) <= {"http://www.w3.org/2000/svg"}, path.name  # a name, not an address
@@ -211,9 +225,7 @@ def test_page_loads_nothing_from_the_network() -> None:
     assert "default-src 'none'" in index
 
 
-def test_rows_of_a_run_make_a_board_and_a_page_with_their_trajectories(
-    track: ScenarioSet, folder: Path
-) -> None:
+def test_rows_of_a_run_make_a_board_and_a_page_with_their_trajectories(track, folder):
     out = folder / "out"
     pairs = [(find(name), track) for name in ("low", "integral")]
     run(pairs, Options(jobs=1, out=out, cells=folder / "cells"))

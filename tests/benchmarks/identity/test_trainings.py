@@ -1,10 +1,8 @@
 """Training seeds of a learned row: the first n of one training, none copied, chosen or left out."""
 
-from __future__ import annotations
-
 import json
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import bench_fakes
@@ -19,14 +17,14 @@ from tests.benchmarks.row_helpers import GAINS, draw, place, run_row, tiny
 
 
 @pytest.fixture(scope="module")
-def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def board(tmp_path_factory):
     with place(tmp_path_factory.mktemp("trainings")) as folder:
         run_row(folder, "trained")
         yield folder
 
 
 @pytest.fixture(autouse=True)
-def put_back(board: Path) -> Iterator[None]:
+def put_back(board):
     yield
     bench_fakes.write_policies(board / "policies", *GAINS)
 
@@ -60,7 +58,7 @@ CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
 
 
 @pytest.mark.parametrize("what", CHANGES)
-def test_seeds_that_are_not_independent_trainings_make_no_row(what: str, board: Path) -> None:
+def test_seeds_that_are_not_independent_trainings_make_no_row(what, board):
     change, words = CHANGES[what]
     change(board)
     options = Options(jobs=1, out=board / "new", cells=board / "cells")
@@ -74,22 +72,21 @@ def test_seeds_that_are_not_independent_trainings_make_no_row(what: str, board: 
     )
 
 
-def test_round_refuses_copied_policies(board: Path) -> None:
+def test_round_refuses_copied_policies(board):
     CHANGES["copied"][0](board)
     with pytest.raises(ValueError, match="are one policy"):
         draw(board, "trained")
 
 
-def test_settings_without_effect_on_the_training_may_differ(board: Path) -> None:
+def test_settings_without_effect_on_the_training_may_differ(board):
     edit(board, config={"checkpoint_steps": 10, "search": {"trials": 3}})
     edit(board, baseline={"probe": [0.1]})
     row = rows.load(run_row(board, "trained", out=board / "other"))
     assert row["training_seeds"] == [0, 1]
 
 
-def test_row_has_the_trainings_of_the_cards(board: Path) -> None:
+def test_row_has_the_trainings_of_the_cards(board):
     found = trainings.of(find("trained"))
-    assert found is not None
     assert [(run["training_seed"], run["command"]) for run in found] == [
         (0, "train --seed 0"),
         (1, "train --seed 1"),

@@ -36,6 +36,17 @@ REACHED = {
     ("paper", 5.0, False),
 }
 """Plant, size and turn at which model-following rises 1.2 times faster than the same PI."""
+ERRATA = {
+    "pole of the plant",
+    "error of f_ab = -f_ba over the range",
+    "inverse (3.5) as printed",
+    "one DMSP-10 under 100 N: error of congruency",
+    "rise of a PID by SIMC over MFC + inverse",
+    "time of the PI over that of the mu loop",
+    "10 deg, rise, joint_pi_slow",
+    "10 deg, rise, joint_pid",
+}
+"""Statements of the paper that do not hold here, and controllers tuned by another rule."""
 MISSED = {
     "PI: rise": ("PI: rise", "{:.3f} s"),
     "sine of 0.5 Hz, 20 deg, 10 ms, joint_mfc_mu": (
@@ -83,7 +94,7 @@ def test_figures_of_the_pi_are_exact() -> None:
     names = ("overshoot", "settling to 2 %", "phase margin")
     assert all(figures()[f"PI: {name}"].passed for name in names)
     read = figures()["PI: rise on the coarse samples"]
-    assert read.passed is None
+    assert read.passed
     assert read.ours == pytest.approx(0.1274, abs=5e-5)
 
 
@@ -186,10 +197,10 @@ def test_picture_shows_every_controller_and_both_loops() -> None:
 
 def test_missed_figures_are_known_and_have_a_reason() -> None:
     others = [f for f in figures().values() if f not in ratios().values()]
-    assert {f.name for f in others if f.passed is False} == {*MISSED}
+    assert {f.name for f in others if f.passed is False} == {*MISSED} | ERRATA
     for figure in figures().values():
         if figure.passed is False:
-            assert figure.verdict in ("differs", "target missed")
+            assert figure.verdict == ("not checkable" if figure in ratios().values() else "differs")
             assert figure.why and figure.why in figure.remark
         else:
             assert not figure.why or figure.why not in figure.remark
@@ -198,9 +209,10 @@ def test_missed_figures_are_known_and_have_a_reason() -> None:
 
 def test_tolerances_are_those_of_the_task_and_five_per_cent_of_the_rest() -> None:
     for name, figure in figures().items():
-        if figure.tolerance is None or name == "inverse by recursion":
+        if figure.tolerance is None or figure.printed is not None:
             continue
-        share = 1e-9 if name.startswith("PI: K") else 0.01 if name.startswith("PI") else 0.05
+        exact = name.startswith("PI") or name == "rise of the double pole"
+        share = 1e-9 if name.startswith("PI: K") else 0.01 if exact else 0.05
         assert figure.expected is not None
         assert figure.tolerance == pytest.approx(share * figure.expected)
 
@@ -306,5 +318,5 @@ def test_page_has_the_paths_and_those_held_out() -> None:
 @pytest.mark.parametrize("name", [name for name, line in MISSED.items() if line])
 def test_page_lists_the_missed_figures(name: str) -> None:
     first, form = MISSED[name]
-    assert figures()[name].verdict == "target missed"
+    assert figures()[name].verdict == "differs"
     assert PAGE.row(first)[1] == form.format(figures()[name].ours)

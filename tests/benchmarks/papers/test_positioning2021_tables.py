@@ -10,30 +10,12 @@ import pytest
 
 from baselines.positioning import contraction_tables as curves
 from benchmarks.papers import positioning as published
+from benchmarks.papers.equations import PRINTED_DEVIATIONS, PRINTED_MEANS, numbers
 from pam_envs.data.tables import BAR, MM, load_contraction_table
 
 TABLE = load_contraction_table()
 MILLI = 0.5e-3 + 1e-9
 """Half a unit of the third decimal, with room for a figure on the half."""
-
-PRINTED_MEANS = {
-    0.0: "0 .41 1 1.6 2.7 3.7 5.2 7.1 8.6 10.18 11.92 12.8 15.1 14.5 13.9 12.7 11.6 10.39 8.22 6.2 "
-    "4.6 3.2 1.9 1 .31",
-    2.55: "0 .3 1.1 1.5 2.4 3.5 5.1 6.92 8.38 9.58 11.62 12.48 14.78 14.5 13.6 12.4 10.9 9.4 7.5 "
-    "5.6 4.2 2.7 1.8 .9 .3",
-    4.55: "0 .1 .5 1 1.9 3 4.4 5.8 7.6 9.7 11.3 12.8 14 13.3 12.4 11.4 9.8 8.2 6.5 4.8 3.5 2.2 1.4 "
-    ".5 .2",
-}
-"""Column "Arithmetic Mean" of Tables 3 to 5 [mm]."""
-PRINTED_DEVIATIONS = {
-    0.0: "0 .04427 .06325 .10488 .22804 .24495 .28983 .14142 .14142 .19391 .13266 .10954 .14142 "
-    ".22803 .14142 .15165 .10954 .06633 .13266 .14142 .15491 .18973 .16733 .14142 .06633",
-    2.55: "0 .08944 .14142 .08944 .14142 .08944 .08944 .11662 .07483 .11662 .11662 .11662 .07483 "
-    ".27568 .08944 .06325 .08944 .14142 .06325 .10954 .14142 .14142 .08944 .08944 .12649",
-    4.55: "0 .06325 .10954 .06325 .10954 .06325 .24495 .06325 .14142 .10954 .12649 .08944 .06325 "
-    ".08944 .08944 .08944 .06325 .08944 .08944 .17889 .14142 .17889 .22804 .10954 .06325",
-}
-"""Column "Standard Deviation" of Tables 3 to 5 [mm]."""
 
 
 def _fit_errors(table: np.ndarray, measured: list) -> list[tuple[float, float, float]]:
@@ -59,10 +41,6 @@ def _table_6_errors(table: np.ndarray) -> list[tuple[float, float, float]]:
     return _fit_errors(table, [(curves.TABLE_6_CONTRACTION, row) for row in rows])
 
 
-def _numbers(text: str) -> np.ndarray:
-    return np.array([float(one) for one in text.split()])
-
-
 def _mean_loop(load: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return pressure [bar], inflating and deflating mean contraction [mm], pressure rising."""
     pressure, inflated = TABLE.branch(load, True)
@@ -73,12 +51,12 @@ def _mean_loop(load: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("load", TABLE.loads)
 def test_printed_means_recompute_to_6_micrometres(load):
     _, mean = TABLE.means(load)
-    np.testing.assert_allclose(mean / MM, _numbers(PRINTED_MEANS[load]), rtol=0, atol=0.0061)
+    np.testing.assert_allclose(mean / MM, numbers(PRINTED_MEANS[load]), rtol=0, atol=0.0061)
 
 
 @pytest.mark.parametrize("load", TABLE.loads)
 def test_printed_deviations_are_of_a_population(load):
-    readings, printed = TABLE.cycles(load)[1] / MM, _numbers(PRINTED_DEVIATIONS[load])
+    readings, printed = TABLE.cycles(load)[1] / MM, numbers(PRINTED_DEVIATIONS[load])
     np.testing.assert_allclose(readings.std(axis=1), printed, rtol=0, atol=1.01e-5)
     sample = readings.std(axis=1, ddof=1)[1:] / printed[1:]
     np.testing.assert_allclose(sample, np.sqrt(5 / 4), rtol=3e-4)

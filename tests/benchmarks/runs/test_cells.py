@@ -1,10 +1,7 @@
 """Cells: dependence of their keys, admissible environments, and groups."""
 
-from __future__ import annotations
-
 import dataclasses
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -13,13 +10,10 @@ from benchmarks.runs import cells, provenance, rollout
 from benchmarks.runs.controllers import find
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios import scenario_env as making
-from benchmarks.scenarios.scenario import ScenarioSet
 from sweeps import worker
 
 
-def test_key_of_a_cell_depends_on_plant_files_and_processor(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_key_of_a_cell_depends_on_plant_files_and_processor(tmp_path, monkeypatch):
     shutil.copytree(making.PLANTS, tmp_path / "plants")
     monkeypatch.setattr(making, "PLANTS", tmp_path / "plants")
     track = scenarios.available()["joint_reduced"]
@@ -37,13 +31,13 @@ def test_key_of_a_cell_depends_on_plant_files_and_processor(
 
 
 @pytest.mark.parametrize("env", ["os:PAM/MusclePositioning-v0", "CartPole-v1", "PAM/../X-v0"])
-def test_only_environments_of_this_package_are_made(env: str) -> None:
+def test_only_environments_of_this_package_are_made(env):
     with pytest.raises(ValueError, match="is no environment of this package"):
         making.make_env(env, {})
 
 
 @pytest.mark.parametrize("plant", ["/etc/passwd", "../positioning_nominal.yaml", "a/b.yaml"])
-def test_only_plants_of_the_folder_of_plants_are_read(plant: str) -> None:
+def test_only_plants_of_the_folder_of_plants_are_read(plant):
     with pytest.raises(ValueError, match="is not the mere name of a file"):
         making.make_env("PAM/AntagonisticJoint-v0", {"plant": plant})
 
@@ -56,7 +50,7 @@ def test_only_plants_of_the_folder_of_plants_are_read(plant: str) -> None:
         ("manipulator_nominal", "joint_mfc_mu_ahead"),  # weights of many arms at once
     ],
 )
-def test_record_does_not_depend_on_the_cells_of_its_group(track: str, controller: str) -> None:
+def test_record_does_not_depend_on_the_cells_of_its_group(track, controller):
     chosen, entrant = scenarios.available()[track], find(controller)
     first = cells.cells_of(entrant, chosen)[0]
     audited = dataclasses.replace(first, split=cells.AUDIT, seeds=(910_001, 910_002), probe=False)
@@ -70,7 +64,7 @@ def test_record_does_not_depend_on_the_cells_of_its_group(track: str, controller
         assert [e["seed"] for e in alone["episodes"]] == list(cell.seeds)
 
 
-def test_group_is_of_one_policy_in_one_scenario(track: ScenarioSet) -> None:
+def test_group_is_of_one_policy_in_one_scenario(track):
     entrant, scenario = find("low"), track.scenarios()[0]
     plain = cells.Cell(entrant, track, scenario, seeds=(1,))
     other = [
@@ -83,7 +77,7 @@ def test_group_is_of_one_policy_in_one_scenario(track: ScenarioSet) -> None:
     assert [group.cells for group in made] == [*zip([plain, *other], audited, strict=True)]
 
 
-def test_cancelled_cell_is_stopped(track: ScenarioSet, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cancelled_cell_is_stopped(track, monkeypatch):
     scenario = track.scenarios()[0]
     cell = cells.Cell(find("low"), track, scenario, seeds=track.seeds[scenario.name])
     asked = iter([False])

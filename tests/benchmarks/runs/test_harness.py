@@ -1,13 +1,7 @@
 """Runs: rows, checkpoints of cells, and files that survive a kill."""
 
-from __future__ import annotations
-
 import json
 import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +12,16 @@ from benchmarks.board import leaderboard
 from benchmarks.runs import rows, verify
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, Report, run
-from benchmarks.runs.store import Store, comparable, read_json, read_record, seal, write_json
+from benchmarks.runs.store import (
+    comparable,
+    read_json,
+    read_record,
+    seal,
+    write_json,
+    write_record,
+)
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import metrics
-from tests.sweeps.processes_of import wait_until
 
 ROOT = Path(__file__).resolve().parents[3]
 NAMES = ("low", "middle", "integral")
@@ -39,7 +39,7 @@ def lasting(path: Path) -> dict[str, Any]:
     return comparable(read_record(path))
 
 
-def test_rows_do_not_depend_on_checkpoint_and_processes(track: ScenarioSet, folder: Path) -> None:
+def test_rows_do_not_depend_on_checkpoint_and_processes(track, folder):
     first = score(track, folder)
     assert not first.missing
     assert first.computed == len(NAMES) * 2
@@ -54,7 +54,7 @@ def test_rows_do_not_depend_on_checkpoint_and_processes(track: ScenarioSet, fold
     assert {p.name: lasting(p) for p in parallel.rows} == before
 
 
-def test_refused_action_is_scored_at_the_worst_case(track: ScenarioSet, folder: Path) -> None:
+def test_refused_action_is_scored_at_the_worst_case(track, folder):
     (path,) = score(track, folder, "refused").rows
     row = lasting(path)
     assert [episode["failed"] for episode in row["episodes"]] == [True] * 6
@@ -64,7 +64,7 @@ def test_refused_action_is_scored_at_the_worst_case(track: ScenarioSet, folder: 
     assert "6 of 6" in text
 
 
-def test_corrupt_cell_is_set_aside_and_computed_again(track: ScenarioSet, folder: Path) -> None:
+def test_corrupt_cell_is_set_aside_and_computed_again(track, folder):
     (path,) = score(track, folder, "low").rows
     before = lasting(path)
     cells = sorted((folder / "cells").glob("*.json"))
@@ -78,40 +78,21 @@ def test_corrupt_cell_is_set_aside_and_computed_again(track: ScenarioSet, folder
     assert lasting(report.rows[0]) == before
 
 
-_WRITER = """
-import os, sys, time
-from pathlib import Path
-from benchmarks.runs.store import write_record
-path, half = Path(sys.argv[1]), len(sys.argv) > 2
-replace = os.replace
-os.replace = lambda *names: time.sleep(600) if half and path.exists() else replace(*names)
-for k in range(10**9):
-    write_record(path, {"k": k, "filling": list(range(3000))})
-"""
-
-
-def test_killed_writer_leaves_a_whole_file(tmp_path: Path) -> None:
+def test_interrupted_write_leaves_the_old_file_and_is_swept(tmp_path, monkeypatch):
     path = tmp_path / "record.json"
-    random = np.random.default_rng(0)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    for turn in range(8):
-        half = ("half",) if turn == 7 else ()  # the last is killed between two files, for certain
-        path.unlink(missing_ok=True)
-        command = [sys.executable, "-c", _WRITER, str(path), *half]
-        writer = subprocess.Popen(command, env=environment)
-        wait_until(lambda writer=writer: path.exists() or writer.poll() is not None)
-        wait_until(lambda half=half: not half or len(list(tmp_path.iterdir())) > 1)
-        assert writer.poll() is None
-        time.sleep(random.uniform(0.0, 0.05))
-        writer.send_signal(signal.SIGKILL)
-        writer.wait()
-        assert len(read_record(path)["filling"]) == 3000
-    assert len(list(tmp_path.iterdir())) > 1
-    Store(tmp_path).sweep()
-    assert list(tmp_path.iterdir()) == [path]
+    write_record(path, {"k": 1})
+    for call in ("fsync", "replace"):
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            patch.setattr(os, call, interrupt)
+            write_record(path, {"k": 2})
+        assert read_record(path)["k"] == 1
 
 
-def test_row_edited_by_hand_fails_its_checksum(track: ScenarioSet, folder: Path) -> None:
+def interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_row_edited_by_hand_fails_its_checksum(track, folder):
     (path,) = score(track, folder, "low").rows
     row = read_json(path)
     row["row"] = "better"
@@ -121,7 +102,7 @@ def test_row_edited_by_hand_fails_its_checksum(track: ScenarioSet, folder: Path)
     assert not verify.verify(path).holds
 
 
-def test_board_is_a_function_of_the_rows(track: ScenarioSet, folder: Path) -> None:
+def test_board_is_a_function_of_the_rows(track, folder):
     score(track, folder)
     files = leaderboard.files(rows.load_all(folder / "out"))
     text = files["leaderboard/MusclePositioning.md"]
@@ -133,7 +114,7 @@ def test_board_is_a_function_of_the_rows(track: ScenarioSet, folder: Path) -> No
     assert text.index("`integral`") < text.index("`middle`")
 
 
-def test_metrics_of_known_episodes() -> None:
+def test_metrics_of_known_episodes():
     t = 0.01 * np.arange(1000)
     error = 2e-3 * np.sin(2 * np.pi * t)
     assert metrics.rms(error) == pytest.approx(2e-3 / np.sqrt(2), rel=1e-3)

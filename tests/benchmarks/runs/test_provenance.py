@@ -1,7 +1,5 @@
 """The commit of a result, with a mark for changed code."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 
@@ -19,7 +17,7 @@ def git(folder: Path, *arguments: str) -> None:
 
 
 @pytest.fixture
-def checkout(tmp_path: Path) -> Path:
+def checkout(tmp_path):
     written = (f"benchmarks/{name}" for name in ("results", "leaderboard", "site"))
     for folder in (*CODE, *written, "docs"):
         (tmp_path / folder).mkdir(exist_ok=True)
@@ -33,13 +31,13 @@ def checkout(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("folder", CODE)
 @pytest.mark.parametrize("name", ["page.txt", "new.py"])
-def test_changed_code_and_scenarios_are_listed(folder: str, name: str, checkout: Path) -> None:
+def test_changed_code_and_scenarios_are_listed(folder, name, checkout):
     assert provenance.changed(checkout) == []
     (checkout / folder / name).write_text("another")
     assert provenance.changed(checkout) == [f"{folder}/{name}"]
 
 
-def test_files_that_a_run_writes_are_not_listed(checkout: Path) -> None:
+def test_files_that_a_run_writes_are_not_listed(checkout):
     places = (
         "results/b.json.xz",
         "leaderboard/a.md",
@@ -52,7 +50,7 @@ def test_files_that_a_run_writes_are_not_listed(checkout: Path) -> None:
     assert provenance.changed(checkout) == []
 
 
-def test_commit_of_changed_code_has_a_mark(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commit_of_changed_code_has_a_mark(monkeypatch):
     found = provenance.commit.__wrapped__
     monkeypatch.setattr(provenance, "git", lambda *_: "c" * 40)
     monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels/build.py"])

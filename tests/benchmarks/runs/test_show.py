@@ -1,9 +1,5 @@
 """Command that shows one episode of any environment."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from benchmarks.__main__ import main
@@ -17,9 +13,7 @@ FIRST = {env: next(n for n, made in CLASSICAL if made.runs_in(env)) for env in s
 
 
 @pytest.mark.parametrize(("env", "controller"), FIRST.items())
-def test_every_environment_is_shown(
-    env: str, controller: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_environment_is_shown(env, controller, capsys):
     options = ["--controller", controller, "--episode-seconds", "2"]
     assert main(["show", env.removeprefix("PAM/"), *options]) == 0
     shown_scores = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
@@ -34,14 +28,14 @@ def test_every_environment_is_shown(
 @pytest.mark.parametrize(
     "env", ["MusclePositioning-v0", "ElbowOrthosis-v0", "RedundantManipulator-v0"]
 )
-def test_episode_is_drawn(env: str, tmp_path: Path) -> None:
+def test_episode_is_drawn(env, tmp_path):
     plot = tmp_path / "episode.svg"
     options = ["--controller", FIRST[f"PAM/{env}"], "--episode-seconds", "0.5"]
     assert main(["show", env, *options, "--plot", str(plot)]) == 0
     assert plot.read_text().rstrip().endswith("</svg>")
 
 
-def test_arguments_reach_the_environment(capsys: pytest.CaptureFixture[str]) -> None:
+def test_arguments_reach_the_environment(capsys):
     short = ["show", "MusclePositioning-v0", "--controller", "zero", "--episode-seconds", "0.5"]
     found = []
     for load in ("0.0", "4.5"):
@@ -60,9 +54,7 @@ def test_arguments_reach_the_environment(capsys: pytest.CaptureFixture[str]) -> 
         (["KneeWalk-v0", "--controller", "pid"], "pid is for PAM/MusclePositioning-v0, not for"),
     ],
 )
-def test_wrong_argument_is_one_sentence(
-    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_argument_is_one_sentence(arguments, said, capsys):
     assert main(["show", *arguments]) == 2
     error = capsys.readouterr().err
     assert said in error
@@ -70,7 +62,7 @@ def test_wrong_argument_is_one_sentence(
     assert len(error.splitlines()) == 1
 
 
-def test_tracks_of_an_environment_share_sensor_gate_and_unit() -> None:
+def test_tracks_of_an_environment_share_sensor_gate_and_unit():
     for track in scenarios.available().values():
         other = TRACKS[track.env].content
         for name in ("sensed", "gate", "settle_seconds", "hold_seconds"):

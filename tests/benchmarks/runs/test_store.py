@@ -1,9 +1,6 @@
 """Records on disk: compression, columns of episodes, full precision and equal bytes."""
 
-from __future__ import annotations
-
 import lzma
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +18,7 @@ def record(episodes: Any = None) -> dict[str, Any]:
     return {"row": "a--b", "episodes": made if episodes is None else episodes}
 
 
-def test_compressed_record_keeps_every_digit(tmp_path: Path) -> None:
+def test_compressed_record_keeps_every_digit(tmp_path):
     given, path = record(), tmp_path / "a" / "b.json.xz"
     store.write_record(path, given)
     read = store.read_record(path)
@@ -29,7 +26,7 @@ def test_compressed_record_keeps_every_digit(tmp_path: Path) -> None:
     assert b'"rms":[0.1257302210933933,' in lzma.decompress(path.read_bytes())
 
 
-def test_equal_records_give_equal_bytes(tmp_path: Path) -> None:
+def test_equal_records_give_equal_bytes(tmp_path):
     for name in ("a", "b"):
         store.write_record(tmp_path / f"{name}.json.xz", dict(reversed(record().items())))
     assert (tmp_path / "a.json.xz").read_bytes() == (tmp_path / "b.json.xz").read_bytes()
@@ -45,14 +42,14 @@ def test_equal_records_give_equal_bytes(tmp_path: Path) -> None:
         [{"seed": 1, "scores": {}}],
     ],
 )
-def test_episodes_with_different_keys_are_kept(episodes: Any, tmp_path: Path) -> None:
+def test_episodes_with_different_keys_are_kept(episodes, tmp_path):
     path = tmp_path / "a.json.xz"
     store.write_record(path, record(episodes))
     assert store.read_record(path)["episodes"] == episodes
 
 
 @pytest.mark.parametrize("damage", ["cut", "text", "list", "columns", "no scores"])
-def test_damaged_file_is_refused(damage: str, tmp_path: Path) -> None:
+def test_damaged_file_is_refused(damage, tmp_path):
     path = tmp_path / "a.json.xz"
     store.write_record(path, record())
     content = path.read_bytes()

@@ -1,7 +1,5 @@
 """Runs whose workers or driver are killed give the rows of an undisturbed run."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess
@@ -9,7 +7,6 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-import psutil
 import pytest
 import yaml
 
@@ -19,7 +16,6 @@ from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
 from benchmarks.runs.store import read_json
 from benchmarks.scenarios import scenario as scenarios
-from benchmarks.scenarios.scenario import ScenarioSet
 from sweeps import engine
 from sweeps.worker import Done
 from tests.benchmarks.conftest import CONTENT
@@ -52,7 +48,7 @@ sys.exit(bool(report.missing))
 
 
 @pytest.fixture(scope="module", autouse=True)
-def gate(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def gate(tmp_path_factory):
     """File that ``integral`` waits for while it exists, in all processes of these tests.
 
     Their programs run so little that compiling it would take longer.
@@ -66,7 +62,7 @@ def gate(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 @pytest.fixture(scope="module")
-def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskProcesses]:
+def dask(tmp_path_factory):
     """A scheduler and two workers that can import the fake controllers."""
     pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
     with DaskProcesses(tmp_path_factory.mktemp("dask"), HERE) as made:
@@ -104,10 +100,6 @@ class Driver:
         driver.wait()
         wait_until(lambda: not alive(self.family))
 
-    def workers(self) -> list[psutil.Process]:
-        """Return loky's processes."""
-        return alive(self.family, "popen_loky")
-
     def rows(self) -> dict[str, str]:
         """Return the rows' texts without times, host and date."""
         found = {}
@@ -119,7 +111,7 @@ class Driver:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def whole(tmp_path_factory):
     """The rows of a run in one process that nothing disturbs."""
     rows = Driver(tmp_path_factory.mktemp("whole")).finish(jobs=1)
     assert len(rows) == len(NAMES)
@@ -127,9 +119,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("backend", ["loky", "dask"])
-def test_run_with_killed_driver_resumes_and_gives_the_same_bytes(
-    backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest, gate: Path
-) -> None:
+def test_run_with_killed_driver_resumes_to_the_same_bytes(backend, whole, tmp_path, request, gate):
     address = request.getfixturevalue("dask").address if backend == "dask" else ""
     driver = Driver(tmp_path, address)
     gate.touch()
@@ -142,26 +132,7 @@ def test_run_with_killed_driver_resumes_and_gives_the_same_bytes(
     wait_until(lambda: not alive(driver.family))
 
 
-@pytest.mark.parametrize("backend", ["loky", "dask"])
-def test_killed_worker_changes_no_row(
-    backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest, gate: Path
-) -> None:
-    dask = request.getfixturevalue("dask") if backend == "dask" else None
-    driver = Driver(tmp_path, dask.address if dask else "")
-    gate.touch()
-    running = driver.start()
-    wait_until(driver.cells)
-    (dask or driver).workers()[0].kill()
-    assert running.poll() is None
-    assert len(driver.cells()) < 2 * len(NAMES)
-    gate.unlink()
-    assert running.wait() == 0, driver.log.read_text()
-    assert driver.rows() == whole
-
-
-def test_two_drivers_on_one_folder_give_the_rows_of_one(
-    whole: dict[str, str], tmp_path: Path
-) -> None:
+def test_two_drivers_on_one_folder_give_the_rows_of_one(whole, tmp_path):
     driver = Driver(tmp_path)
     first, second = driver.start(jobs=1), driver.start(jobs=1)
     assert first.wait() == second.wait() == 0, driver.log.read_text()
@@ -174,7 +145,7 @@ def test_two_drivers_on_one_folder_give_the_rows_of_one(
 
 
 @pytest.fixture
-def ask(track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
+def ask(track, folder, monkeypatch):
     """Return what runs the command on the short track."""
     monkeypatch.setattr(scenarios, "available", lambda *_: {track.name: track})
     places = ("--out", str(folder / "out"), "--cells", str(folder / "cells"), "--jobs", "1")
@@ -185,9 +156,7 @@ def ask(track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Ca
     return run
 
 
-def test_dry_run_lists_cells_and_runs_none(
-    ask: Callable[..., int], folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_dry_run_lists_cells_and_runs_none(ask, folder, capsys):
     assert ask("--dry-run") == 0
     listed = capsys.readouterr().out.splitlines()
     assert listed[0].startswith("to run  low in short/maxwell_slip_steps")
@@ -204,9 +173,7 @@ def test_dry_run_lists_cells_and_runs_none(
     assert capsys.readouterr().out.splitlines()[-1] == "2 cells, 2 to run"
 
 
-def test_exit_code_and_message_state_the_kind_of_failure(
-    ask: Callable[..., int], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_exit_code_and_message_state_the_kind_of_failure(ask, monkeypatch, capsys):
     def wrong(*_: object) -> None:
         raise ArithmeticError("no number")
 
@@ -231,7 +198,7 @@ def test_exit_code_and_message_state_the_kind_of_failure(
     assert "0 cells computed, 2 were there already" in capsys.readouterr().out
 
 
-def test_closed_output_is_no_error() -> None:
+def test_closed_output_is_no_error():
     command = [sys.executable, "-m", "benchmarks", "cite", "positioning_nominal--inverse"]
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, cwd=HERE.parents[1], **streams) as asked:
@@ -242,9 +209,7 @@ def test_closed_output_is_no_error() -> None:
     assert "Broken" not in said
 
 
-def test_cell_removed_by_another_run_is_reported(
-    track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cell_removed_by_another_run_is_reported(track, folder, monkeypatch):
     options = Options(jobs=1, out=folder / "out", cells=folder / "cells")
     pairs = [(find("low"), track), (find("middle"), track)]
     assert len(run(pairs, options).rows) == 2
@@ -262,9 +227,7 @@ def test_cell_removed_by_another_run_is_reported(
     assert all("removed meanwhile" in line for line in report.missing)
 
 
-def test_row_is_written_once_its_cells_are_there(
-    track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_row_is_written_once_its_cells_are_there(track, folder, monkeypatch):
     written = []
 
     def looking(act: object, groups: Iterable[cells.Group], cluster: object) -> Iterator[Done]:

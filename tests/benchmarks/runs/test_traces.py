@@ -1,7 +1,5 @@
 """Thinned trajectories: chosen episodes, drawn signals and the resolution of the grid."""
 
-from __future__ import annotations
-
 import board_fakes as fakes
 import numpy as np
 import pytest
@@ -10,7 +8,7 @@ from benchmarks.runs import traces
 from benchmarks.scenarios.scenario import ScenarioSet
 
 
-def test_packed_signal_is_restored_within_its_grid_and_keeps_gaps() -> None:
+def test_packed_signal_is_restored_within_its_grid_and_keeps_gaps():
     values = np.array([-3.0, np.nan, 0.123456, 7.0])
     packed = traces.pack(values)
     found = traces.unpack(packed)
@@ -21,13 +19,13 @@ def test_packed_signal_is_restored_within_its_grid_and_keeps_gaps() -> None:
     assert np.isnan(traces.unpack(traces.pack(np.full(2, np.nan)))).all()
 
 
-def test_one_moving_and_one_resting_reference_are_drawn() -> None:
+def test_one_moving_and_one_resting_reference_are_drawn():
     assert traces.chosen(ScenarioSet(fakes.CONTENT)) == ("sines", "steps")
     only = {**fakes.CONTENT, "grid": {"reference": ["steps"]}}
     assert traces.chosen(ScenarioSet(only)) == ("steps",)
 
 
-def test_episode_is_thinned_and_loop_is_output_over_pressure() -> None:
+def test_episode_is_thinned_and_loop_is_output_over_pressure():
     made = fakes.trace("pid")
     assert made["pressures"] == ["state/pressure"]
     assert made["loop"] == ["pressure", "output"]
@@ -37,7 +35,7 @@ def test_episode_is_thinned_and_loop_is_output_over_pressure() -> None:
     assert output[10] == pytest.approx(5e-3 + 1e-3 * np.cos(0.21), abs=0.5 * 2e-3 / traces.GRID)
 
 
-def test_loop_of_antagonistic_pair_is_over_pressure_difference() -> None:
+def test_loop_of_antagonistic_pair_is_over_pressure_difference():
     time = np.array([0.01, 0.02])
     signals = {
         "time": time,
@@ -51,7 +49,7 @@ def test_loop_of_antagonistic_pair_is_over_pressure_difference() -> None:
     assert traces.unpack(made["signals"]["loop/across"]) == pytest.approx([1e5, 3e5])
 
 
-def test_reference_has_gaps_outside_its_gate() -> None:
+def test_reference_has_gaps_outside_its_gate():
     time = np.array([0.01, 0.02, 0.03])
     signals = {"time": time, "reference": time, "output": time, "state/stance": np.array([1, 0, 1])}
     made = traces.of_episode("only", 1, signals, {"gate": ["state/stance"]})

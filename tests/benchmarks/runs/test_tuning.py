@@ -1,7 +1,5 @@
 """Search of knobs: repeatable, resumable, never worse, and written for the catalogue."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -125,7 +123,7 @@ def test_episodes_are_on_tuning_seeds_each_once(name):
 
 
 @pytest.fixture
-def short() -> ScenarioSet:
+def short():
     """The track that positioning is tuned on, two kinds of reference and short."""
     content = dict(tuning.nominal_track(POSITIONING).content)
     content |= {"settle_seconds": 0.5, "hold_seconds": 0.2, "per_reference": {}}

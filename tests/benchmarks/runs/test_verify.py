@@ -1,11 +1,9 @@
 """Verification finds altered rows, whatever their checksum, and void rows by behaviour."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +27,7 @@ DRAWN, SALT = "5a" * 16, "4f" * 16
 
 
 @pytest.fixture(scope="module")
-def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def board(tmp_path_factory):
     with place(tmp_path_factory.mktemp("board")) as folder:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(audit.secrets, "token_hex", lambda _: DRAWN)
@@ -48,7 +46,7 @@ def verdict_of(board: Path, name: str) -> verify.Verdict:
 
 
 @pytest.fixture
-def forged(board: Path) -> Iterator[Callable[..., verify.Verdict]]:
+def forged(board):
     """Return a function that alters a row, renews its checksum, verifies it and restores it."""
     kept: dict[Path, bytes] = {}
 
@@ -75,7 +73,7 @@ def assert_drifted(verdict: verify.Verdict, words: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["trained", "tuned", "integral", "raises"])
-def test_honest_row_is_reproduced_to_the_last_bit(name: str, board: Path) -> None:
+def test_honest_row_is_reproduced_to_the_last_bit(name, board):
     verdict = verdict_of(board, name)
     assert (verdict.drifted, verdict.mode) == ([], "bits")
     assert not [note for note in verdict.notes if "commit" not in note]
@@ -170,12 +168,12 @@ FORGERIES: dict[str, tuple[str, Change, str]] = {
 
 
 @pytest.mark.parametrize("what", FORGERIES)
-def test_forged_entry_is_detected(what: str, forged: Any) -> None:
+def test_forged_entry_is_detected(what, forged):
     name, change, words = FORGERIES[what]
     assert_drifted(forged(name, change), words)
 
 
-def test_row_of_another_commit_may_differ_by_rounding(forged: Any) -> None:
+def test_row_of_another_commit_may_differ_by_rounding(forged):
     def change(row: Row) -> None:
         row["made_with"]["commit"] = ZEROS[:40]
         put(RMS, a_hair_less)(row)
@@ -186,9 +184,7 @@ def test_row_of_another_commit_may_differ_by_rounding(forged: Any) -> None:
 
 
 @pytest.mark.parametrize(("steps", "holds"), [(1, True), (3, False)])
-def test_plotted_curves_may_differ_by_the_step_of_their_grid(
-    steps: int, holds: bool, forged: Any
-) -> None:
+def test_plotted_curves_may_differ_by_the_step_of_their_grid(steps, holds, forged):
     def shift(curve: Row) -> Row:
         values = traces.unpack(curve)
         values[1] += steps / traces.GRID * (curve["high"] - curve["low"])
@@ -199,13 +195,13 @@ def test_plotted_curves_may_differ_by_the_step_of_their_grid(
     assert verdict.mode == "bits"
 
 
-def test_changed_description_is_a_note(forged: Any) -> None:
+def test_changed_description_is_a_note(forged):
     verdict = forged("integral", put("controller.summary", "another"))
     assert verdict.holds
     assert any(note.startswith("description.summary: 'another'") for note in verdict.notes)
 
 
-def test_swapped_policy_is_detected(board: Path) -> None:
+def test_swapped_policy_is_detected(board):
     try:
         bench_fakes.write_policies(board / "policies", 0.02, 0.0500001)
         verdict = verdict_of(board, "trained")
@@ -217,7 +213,7 @@ def test_swapped_policy_is_detected(board: Path) -> None:
     assert why == ["policy files changed"]
 
 
-def test_changed_knob_voids_exactly_the_rows_of_its_controller(board: Path) -> None:
+def test_changed_knob_voids_exactly_the_rows_of_its_controller(board):
     try:
         bench_fakes.write_knobs(board / "policies", tuned={"gain": 0.020000001}, other={"lead": 2})
         why = {n: verify.void(rows.load(path_of(board, n))) for n in ("tuned", "integral")}
@@ -228,7 +224,7 @@ def test_changed_knob_voids_exactly_the_rows_of_its_controller(board: Path) -> N
     assert_drifted(verdict, "knob gain changed")
 
 
-def test_row_of_another_controller_is_detected(board: Path) -> None:
+def test_row_of_another_controller_is_detected(board):
     path = path_of(board, "low")
     row = read_record(path_of(board, "integral"))
     row["controller"]["name"], row["row"] = "low", "tiny--low"
@@ -238,7 +234,7 @@ def test_row_of_another_controller_is_detected(board: Path) -> None:
     assert_drifted(verdict, "controller.artefact.digest")
 
 
-def test_changed_environment_voids_rows(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_environment_voids_rows(board, monkeypatch):
     low, high = muscle_positioning.REFERENCE_RANGE
     monkeypatch.setattr(muscle_positioning, "REFERENCE_RANGE", (low, high * (1.0 - 1e-9)))
     row = rows.load(path_of(board, "trained"))
@@ -246,12 +242,12 @@ def test_changed_environment_voids_rows(board: Path, monkeypatch: pytest.MonkeyP
     assert_drifted(verdict_of(board, "integral"), "task: ")
 
 
-def test_scenarios_of_another_version_are_not_run(forged: Any) -> None:
+def test_scenarios_of_another_version_are_not_run(forged):
     (line,) = forged("integral", put("scenarios.content.settle_seconds", 0.25)).drifted
     assert "scenarios: the content is not that of tiny.yaml, version 1" in line
 
 
-def test_row_of_another_environment_version_is_refused(forged: Any) -> None:
+def test_row_of_another_environment_version_is_refused(forged):
     def change(row: Row) -> None:
         text = json.dumps(row).replace("Positioning-v0", "Positioning-v1")
         row.update(json.loads(text.replace('"version": 0', '"version": 1')))
@@ -261,9 +257,7 @@ def test_row_of_another_environment_version_is_refused(forged: Any) -> None:
 
 
 @pytest.mark.parametrize("honest", [False, True])
-def test_environment_and_code_named_by_a_row_are_not_executed(
-    honest: bool, forged: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_environment_and_code_named_by_a_row_are_not_run(honest, forged, monkeypatch, tmp_path):
     """A row may hold digests that fit its own content: none of it is imported."""
     module, mark = tmp_path / "stranger.py", tmp_path / "ran"
     module.write_text(f"open({str(mark)!r}, 'w')")
@@ -280,25 +274,25 @@ def test_environment_and_code_named_by_a_row_are_not_executed(
     assert not mark.exists()
 
 
-def test_names_containing_a_path_are_refused(forged: Any) -> None:
+def test_names_containing_a_path_are_refused(forged):
     verdict = forged("integral", lambda row: row.update(row="../../../escaped"), loads=False)
     assert_drifted(verdict, "file, row, track and controller have to agree")
 
 
-def test_missing_entries_are_named(forged: Any) -> None:
+def test_missing_entries_are_named(forged):
     verdict = forged("integral", lambda row: row.pop("env"), loads=False)
     assert_drifted(verdict, "a row without env, env.id, env.version")
     verdict = forged("integral", lambda row: row["episodes"][0].pop("split"))
     assert_drifted(verdict, "cannot be run again: there is no 'split'")
 
 
-def test_audit_without_a_round_is_detected(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_audit_without_a_round_is_detected(board, monkeypatch):
     monkeypatch.setattr(audit, "FILE", board / "none.json")
     words = "the last round of tiny (no round was drawn); run `python -m benchmarks audit tiny`"
     assert_drifted(verdict_of(board, "trained"), words)
 
 
-def test_damaged_file_is_detected(board: Path, tmp_path: Path) -> None:
+def test_damaged_file_is_detected(board, tmp_path):
     path = rows.path_of("tiny--integral", tmp_path)
     path.parent.mkdir()
     row = read_json(path_of(board, "integral"))
@@ -315,7 +309,7 @@ def test_damaged_file_is_detected(board: Path, tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+def elsewhere(monkeypatch):
     """Another processor, on which controllers round otherwise."""
     monkeypatch.setattr(provenance, "cpu", lambda: "another")
     for kind in (bench_fakes.Trained, bench_fakes.Inverse):
@@ -333,18 +327,14 @@ def rounding(predict: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @pytest.mark.parametrize("name", ["trained", "tuned", "integral"])
-def test_row_is_reproduced_within_tolerance_on_another_machine(
-    name: str, board: Path, elsewhere: None
-) -> None:
+def test_row_is_reproduced_within_tolerance_on_another_machine(name, board, elsewhere):
     verdict = verdict_of(board, name)
     assert (verdict.drifted, verdict.mode) == ([], "elsewhere")
     assert any(" fields differ in bits, the first: " in note for note in verdict.notes)
     assert verify.void(rows.load(path_of(board, name))) == []  # still in its round
 
 
-def test_other_design_on_another_machine_is_not_that_of_the_round(
-    board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_design_on_another_machine_is_not_that_of_the_round(board, elsewhere, monkeypatch):
     make = bench_fakes.make_controller
 
     def designed(name: str, *arguments: Any, **named: Any) -> Any:
@@ -357,9 +347,7 @@ def test_other_design_on_another_machine_is_not_that_of_the_round(
     assert_drifted(verdict_of(board, "tuned"), "audit: task and controller are not those of")
 
 
-def test_scores_near_zero_may_differ_on_another_machine(
-    board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_scores_near_zero_may_differ_on_another_machine(board, elsewhere, monkeypatch):
     score = metrics.score
     path = run_row(board, "integral", out=board / "nothing", cells=board / "nothing cells")
     row = read_record(path)
@@ -381,7 +369,7 @@ FOUND_ELSEWHERE: dict[str, tuple[Change, str]] = {
 
 
 @pytest.mark.parametrize("what", FOUND_ELSEWHERE)
-def test_forgery_beyond_rounding_is_detected_on_another_machine(what: str, forged: Any) -> None:
+def test_forgery_beyond_rounding_is_detected_on_another_machine(what, forged):
     """A row that falsely says that it was made elsewhere gains nothing."""
 
     def change(row: Row) -> None:
@@ -393,9 +381,7 @@ def test_forgery_beyond_rounding_is_detected_on_another_machine(what: str, forge
     assert_drifted(verdict, FOUND_ELSEWHERE[what][1])
 
 
-def test_inapplicable_metric_is_not_drift(
-    board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_inapplicable_metric_is_not_drift(board, elsewhere, monkeypatch):
     score = metrics.score
     undefined = {"p95_error": float("nan")}
     monkeypatch.setattr(metrics, "score", lambda *a, **k: score(*a, **k) | undefined)
@@ -403,9 +389,7 @@ def test_inapplicable_metric_is_not_drift(
     assert verify.verify(path).holds
 
 
-def test_commands_print_and_record_outcomes(
-    board: Path, forged: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_commands_print_and_record_outcomes(board, forged, capsys):
     honest, other = (str(path_of(board, name)) for name in ("integral", "raises"))
     assert main(["verify", honest, other, "--jobs", "1"]) == 0
     assert "tiny--integral: reproduced\n" in capsys.readouterr().out
@@ -413,7 +397,6 @@ def test_commands_print_and_record_outcomes(
     assert set(found) == {"tiny--integral", "tiny--raises"}
     row = rows.load(Path(honest))
     entry = verified.of(row, found)
-    assert entry is not None
     assert (entry["mode"], entry["commit"]) == ("bits", provenance.commit())
     assert verified.of({**row, "checksum": "another"}, found) is None
     assert main(["void", honest, other]) == 0
@@ -430,7 +413,7 @@ def test_commands_print_and_record_outcomes(
         assert "there is no row 'tiny--nobody'" in capsys.readouterr().err
 
 
-def test_bit_exact_verification_is_kept_after_a_tolerant_one(tmp_path: Path) -> None:
+def test_bit_exact_verification_is_kept_after_a_tolerant_one(tmp_path):
     path = rows.path_of("a--b", tmp_path)
 
     def noted(checksum: str, mode: str) -> str | None:

@@ -1,7 +1,5 @@
 """The elbow's metrics, on signals whose scores are known."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -57,13 +55,13 @@ CONTENT = {
 OWN = ("stiffness", "felt", "object", "slack", "torque_clipped", "stiffness_clipped")
 
 
-def test_perfect_record_has_zero_error() -> None:
+def test_perfect_record_has_zero_error():
     scores = score()
     assert set(scores) == set(metrics.of_track({"metrics": ["elbow"]}))
     assert all(scores[name] == 0.0 for name in (*ELBOW, "rms_error"))
 
 
-def test_each_metric_responds_to_its_own_error() -> None:
+def test_each_metric_responds_to_its_own_error():
     assert score(stiffness=4.5 + WAVE)["stiffness_rms"] == pytest.approx(0.5)
     assert score(stiffness=4.5 + WAVE)["impedance_rms"] == pytest.approx(0.5 * NEAR)
     assert score(output=WAVE + 0.3)["impedance_rms"] == pytest.approx(0.3)
@@ -86,7 +84,7 @@ def test_each_metric_responds_to_its_own_error() -> None:
 
 
 @pytest.mark.parametrize("name", [n for n in available() if n.startswith("elbow")])
-def test_tracks_have_worst_cases_and_columns_for_every_metric(name: str) -> None:
+def test_tracks_have_worst_cases_and_columns_for_every_metric(name):
     content = available()[name].content
     expected = set(metrics.of_track(content))
     assert set(content["worst_case"]) == expected

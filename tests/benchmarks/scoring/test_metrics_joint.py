@@ -1,7 +1,5 @@
 """Metrics of joints and arms, on records whose scores are known and on episodes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,7 +56,7 @@ def score(record: dict[str, np.ndarray], group: str) -> dict[str, float]:
     return metrics.score(record, PERIOD, content)
 
 
-def test_percent_error_is_relative_to_half_range() -> None:
+def test_percent_error_is_relative_to_half_range():
     reference = joint()["reference"]
     scores = score(joint(output=reference + 0.02), "joint")
     assert scores["rms_error"] == pytest.approx(0.02)
@@ -66,7 +64,7 @@ def test_percent_error_is_relative_to_half_range() -> None:
     assert set(scores) == set(metrics.of_track({"metrics": ["joint"]}))
 
 
-def test_sensed_and_model_errors_are_scored_beside_the_headline() -> None:
+def test_sensed_and_model_errors_are_scored_beside_the_headline():
     angle = joint()["state/angle"]
     scores = score(joint(sensed=angle + 0.01), "joint")
     assert scores["rms_error"] == 0.0
@@ -77,14 +75,14 @@ def test_sensed_and_model_errors_are_scored_beside_the_headline() -> None:
     assert modelled["model_rms_error"] == pytest.approx(0.03)
 
 
-def test_shares_of_time_refer_to_the_window_after_settling() -> None:
+def test_shares_of_time_refer_to_the_window_after_settling():
     short = (TIME <= 6.0).astype(float)
     scores = score(joint(saturated=short, **{"state/slack": 2.0 * short}), "joint")
     assert scores["saturated_time"] == pytest.approx(0.5)
     assert scores["slack_time"] == pytest.approx(0.5)
 
 
-def test_chain_scores_tip_pointing_joints_and_model_separately() -> None:
+def test_chain_scores_tip_pointing_joints_and_model_separately():
     models = {"model/0": np.full(N, 0.04), "model/1": np.full(N, -0.3)}
     scores = score(chain(**models), "chain")
     assert set(scores) == set(metrics.of_track({"metrics": ["chain"]}))
@@ -98,12 +96,12 @@ def test_chain_scores_tip_pointing_joints_and_model_separately() -> None:
     assert np.isnan(one["model_rms_error"])  # a model of one joint is no model of the arm
 
 
-def test_tip_error_displaces_the_whole_tool() -> None:
+def test_tip_error_displaces_the_whole_tool():
     scores = score(chain(**{"state/x": np.full(N, 3e-3)}), "chain")
     assert scores["tool_rms_error"] == pytest.approx(3e-3)
 
 
-def test_pointing_error_counts_by_half_of_its_displacement() -> None:
+def test_pointing_error_counts_by_half_of_its_displacement():
     turned = {"state/point_y": np.full(N, 0.04)}  # the tip is right, the other point 10 mm off
     scores = score(chain(output=np.zeros(N), **turned), "chain")
     assert scores["rms_error"] == 0.0
@@ -116,12 +114,12 @@ def test_pointing_error_counts_by_half_of_its_displacement() -> None:
     assert score(chain(**about), "chain")["tool_rms_error"] == pytest.approx(5e-3)
 
 
-def test_tool_is_scored_after_settling_only() -> None:
+def test_tool_is_scored_after_settling_only():
     early = {"state/z": np.where(TIME <= 2.0, 0.1, 0.0)}
     assert score(chain(**early), "chain")["tool_rms_error"] == 0.0
 
 
-def test_steady_state_error_of_tip_is_scored_while_its_path_rests() -> None:
+def test_steady_state_error_of_tip_is_scored_while_its_path_rests():
     moving = np.clip(TIME - 3.0, 0.0, 2.0)  # 3 s to 5 s; it counts as at rest from 5.5 s on
     off = np.where((TIME > 2.5) & (TIME < 5.5), 0.02, 1e-3)
     record = chain(output=off, **{f"state/{r}point_x": moving for r in ("", "reference_")})
@@ -133,7 +131,7 @@ def test_steady_state_error_of_tip_is_scored_while_its_path_rests() -> None:
     assert still[-1] == pytest.approx(2.0)
 
 
-def test_chain_is_ranked_by_its_whole_tool() -> None:
+def test_chain_is_ranked_by_its_whole_tool():
     arm, one = TRACKS["manipulator_nominal"].content, TRACKS["joint_nominal"].content
     assert metrics.headline_of(arm) == "tool_rms_error"
     assert metrics.headline_of(one) == metrics.HEADLINE == "rms_error"
@@ -162,7 +160,7 @@ def _row(content: Any, name: str, tip: float, *tool: float) -> dict[str, Any]:
     }
 
 
-def test_scores_by_setting_are_of_the_headline() -> None:
+def test_scores_by_setting_are_of_the_headline():
     track = TRACKS["manipulator_nominal"]
     errors = np.arange(1.0, 1.0 + len(track.scenarios()))
     found = views.by_setting(_row(track.content, "any", 9.0, *errors))
@@ -188,7 +186,7 @@ class Follower:
 
 
 @pytest.mark.parametrize(("name", "joints"), [(JOINT, 1), (CHAIN, 6)])
-def test_episode_records_model_output_at_the_same_instants(name: str, joints: int) -> None:
+def test_episode_records_model_output_at_the_same_instants(name, joints):
     env = gym.make(name, episode_seconds=0.2)
     episode = rollout.run(env, Follower(joints), 0)
     for k in range(joints):
@@ -200,7 +198,7 @@ def test_episode_records_model_output_at_the_same_instants(name: str, joints: in
 
 
 @pytest.mark.parametrize("name", sorted(TRACKS))
-def test_tracks_name_existing_signals(name: str) -> None:
+def test_tracks_name_existing_signals(name):
     track: ScenarioSet = TRACKS[name]
     keys = gym.make(track.env).unwrapped.setup.info_keys
     assert track.content["sensed"] in keys
@@ -213,7 +211,7 @@ def test_tracks_name_existing_signals(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(TRACKS))
-def test_environments_of_all_scenarios_can_be_made(name: str) -> None:
+def test_environments_of_all_scenarios_can_be_made(name):
     """Payloads and references of the tracks are what the muscles bear."""
     for scenario in TRACKS[name].scenarios():
         env = make_env(TRACKS[name].env, scenario.kwargs)
@@ -221,13 +219,13 @@ def test_environments_of_all_scenarios_can_be_made(name: str) -> None:
         assert TRACKS[name].content.get("tool_length", 0.25) == lengths[-1]
 
 
-def test_joint_and_chain_have_every_kind_of_track() -> None:
+def test_joint_and_chain_have_every_kind_of_track():
     for word in ("joint", "manipulator"):
         assert {f"{word}_nominal", f"{word}_payload", f"{word}_wrong_model"} <= set(TRACKS)
     assert {"joint_disturbed", "joint_reduced"} <= set(TRACKS)
 
 
-def test_run_ended_by_a_stop_counts_at_worst_case() -> None:
+def test_run_ended_by_a_stop_counts_at_worst_case():
     content = TRACKS["joint_nominal"].content
     scores = score(joint(), "joint")
     worst = metrics.worst_of(scores, content["worst_case"])

@@ -1,7 +1,5 @@
 """The knee's metrics, on signals whose scores are known."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 
@@ -67,7 +65,7 @@ def score(record: dict[str, np.ndarray], **how: Any) -> dict[str, float]:
     return metrics.score(record, PERIOD, content | how)
 
 
-def test_perfect_record_has_no_error_and_the_constructed_ratios() -> None:
+def test_perfect_record_has_no_error_and_the_constructed_ratios():
     scores = score(signals())
     assert set(scores) == set(metrics.of_track({"metrics": ["range", "gait"]}))
     for name in ("rms_error", "rms_percent", "angle_rms", "switch_error", "torque_rms"):
@@ -81,7 +79,7 @@ def test_perfect_record_has_no_error_and_the_constructed_ratios() -> None:
     assert 0.0 < scores["emg_ratio_fitted_b"] < 1.0
 
 
-def test_tension_counts_in_stance_and_angle_in_swing() -> None:
+def test_tension_counts_in_stance_and_angle_in_swing():
     record = signals()
     record["output"] = record["reference"] + np.where(STANCE > 0.5, 5.0, 80.0)
     record["state/angle"] = record["state/angle_reference"] + np.where(STANCE > 0.5, 0.5, 0.1)
@@ -95,7 +93,7 @@ def test_tension_counts_in_stance_and_angle_in_swing() -> None:
 
 
 @pytest.mark.parametrize("seen", [0.0, 1.0])
-def test_samples_with_wrong_sensed_phase_are_not_scored(seen: float) -> None:
+def test_samples_with_wrong_sensed_phase_are_not_scored(seen):
     record = signals()
     record["output"] = record["reference"] + 5.0
     record["state/angle"] = record["state/angle_reference"] + 0.1
@@ -109,7 +107,7 @@ def test_samples_with_wrong_sensed_phase_are_not_scored(seen: float) -> None:
         assert after[name] == pytest.approx(before[name], rel=1e-3), name
 
 
-def test_open_valve_does_not_reduce_emg() -> None:
+def test_open_valve_does_not_reduce_emg():
     env: Any = gym.make(
         "PAM/KneeWalk-v0", start="heel_contact", strides="identical", episode_seconds=16.0
     ).unwrapped
@@ -124,7 +122,7 @@ def test_open_valve_does_not_reduce_emg() -> None:
     assert ratios["emg_ratio_fitted_a"] == pytest.approx(1.83, abs=0.03)
 
 
-def test_reading_b_gives_little_emg_for_a_small_sustained_torque() -> None:
+def test_reading_b_gives_little_emg_for_a_small_sustained_torque():
     """All of Eq. (1) as demand, and a power of 2: the flexors' 15 N m are a tenth of the peak."""
     demand = np.where(STANCE > 0.5, 50.0, 0.0)
     open_valve = np.full(N, 15.0)
@@ -139,12 +137,12 @@ def test_reading_b_gives_little_emg_for_a_small_sustained_torque() -> None:
     assert ratios["emg_ratio_fitted_a"] > 0.65  # (27.5 - 15) / 27.5 and 15 / 27.5
 
 
-def test_gate_that_never_opens_is_reported() -> None:
+def test_gate_that_never_opens_is_reported():
     with pytest.raises(ValueError, match="state/stance and sensor/stance are never 1 together"):
         score(signals(**{"state/stance": np.zeros(N)}))
 
 
-def test_landings_are_the_first_samples_of_stance_after_swing() -> None:
+def test_landings_are_the_first_samples_of_stance_after_swing():
     stance = np.zeros(400)
     stance[100:200] = 1.0
     stance[205:210] = 1.0  # a heel that chatters as it is lifted
@@ -152,7 +150,7 @@ def test_landings_are_the_first_samples_of_stance_after_swing() -> None:
     np.testing.assert_array_equal(metrics_knee.landings(stance, PERIOD), [100, 300])
 
 
-def test_jump_is_the_mean_over_landings_of_the_largest_subsequent_change() -> None:
+def test_jump_is_the_mean_over_landings_of_the_largest_subsequent_change():
     record, starts = signals(), np.flatnonzero(np.diff(STANCE) > 0.0) + 1
     first, second = starts
     for k, size, change in ((first, 30.0, 1e4), (second, 10.0, 3e4)):
@@ -166,25 +164,25 @@ def test_jump_is_the_mean_over_landings_of_the_largest_subsequent_change() -> No
     assert scores["pressure_jump"] == pytest.approx(2e4)
 
 
-def test_saturated_time_is_the_share_at_the_capacity() -> None:
+def test_saturated_time_is_the_share_at_the_capacity():
     over = np.where(TIME <= 2.5, 1e3, 0.0)
     assert score(signals(**{"cost/pressure": over}))["saturated_time"] == pytest.approx(0.25)
 
 
-def test_inactive_muscle_has_no_emg_ratio() -> None:
+def test_inactive_muscle_has_no_emg_ratio():
     still = np.zeros(N)
     scores = score(signals(**{"effort/flexors": still, "effort/flexors_free": still}))
     assert np.isnan(scores["emg_flexors_ratio"])
 
 
-def test_units_follow_the_track() -> None:
+def test_units_follow_the_track():
     units = metrics.of_track({"unit": "N", "metrics": ["gait"]})
     assert units["rms_error"] == units["max_error"] == "N"
     assert units["angle_rms"] == "rad" and units["air_use"] == "kg/s"
     assert metrics.of_track({}) == metrics.METRICS
 
 
-def test_unknown_metric_group_or_missing_worst_case_is_refused() -> None:
+def test_unknown_metric_group_or_missing_worst_case_is_refused():
     content = dict(available()["knee_walk_nominal"].content)
     with pytest.raises(ValueError, match="choose from elbow, joint, chain, range, gait"):
         ScenarioSet(content | {"metrics": ["stride"]})
@@ -192,7 +190,7 @@ def test_unknown_metric_group_or_missing_worst_case_is_refused() -> None:
         ScenarioSet(content | {"worst_case": {"rms_error": 1.0}})
 
 
-def test_no_finished_episode_of_the_board_is_worse_than_the_worst_case() -> None:
+def test_no_finished_episode_of_the_board_is_worse_than_the_worst_case():
     """Or a controller would gain by having an episode ended."""
     found = [path for path in rows.files() if path.parent.name.startswith("knee_")]
     assert len(found) > 100

@@ -1,7 +1,5 @@
 """Probes of training (time within the plants, below all wrappers) and of planning."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest
@@ -15,9 +13,7 @@ from benchmarks.speed.groups import measure
 @pytest.mark.parametrize(
     ("rest", "share", "verdict"), [(38.0, 0.05, "pass"), (18.0, 0.1, "MISSED")]
 )
-def test_environment_share_refers_to_the_whole_rollout(
-    monkeypatch: pytest.MonkeyPatch, rest: float, share: float, verdict: str
-) -> None:
+def test_environment_share_refers_to_the_whole_rollout(monkeypatch, rest, share, verdict):
     now = [0.0]
     monkeypatch.setattr(speed_learning, "time", SimpleNamespace(process_time=lambda: now[0]))
 
@@ -41,7 +37,7 @@ def test_environment_share_refers_to_the_whole_rollout(
 
 
 @pytest.mark.parametrize("variant", ["", "residual"])
-def test_all_batches_of_a_preset_are_found(variant: str) -> None:
+def test_all_batches_of_a_preset_are_found(variant):
     building = pytest.importorskip(
         "agents.training.building", reason="the extra 'agents' is not there"
     )
@@ -57,7 +53,7 @@ def test_all_batches_of_a_preset_are_found(variant: str) -> None:
 
 
 @pytest.mark.parametrize(("rate", "verdict"), [(1999.0, "MISSED"), (2001.0, "pass"), (3e4, "aim")])
-def test_planning_has_a_required_rate(monkeypatch, rate: float, verdict: str) -> None:
+def test_planning_has_a_required_rate(monkeypatch, rate, verdict):
     def timed(subjects, rounds):
         assert subjects["poses"]() == 3 * 2 * 41 * probes.REPEATS
         return {"poses": [rate] * rounds}

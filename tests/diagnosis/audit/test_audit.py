@@ -1,7 +1,5 @@
 """Audit of recordings and tables, and noise floor, on synthetic data."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -11,7 +9,7 @@ from scipy.signal import lfilter
 from pam_envs.data.recording.recording import Recording, Rig
 from pam_envs.data.tables import ContractionTable, load_contraction_table, load_readings
 from pam_envs.diagnosis.audit.audit import audit, undecidable
-from pam_envs.diagnosis.audit.noise import hold_ends, noise_floor, resolution, white_noise
+from pam_envs.diagnosis.audit.noise import hold_ends, noise_floor, resolution
 from pam_envs.diagnosis.audit.tables import repeat_trend, scatter, scatter_homogeneity
 from pam_envs.diagnosis.cause import NEEDS, Cause
 from pam_envs.diagnosis.causes import catalogue
@@ -119,13 +117,10 @@ def test_rounded_readings_have_no_warning():
 def test_constant_reading_under_moving_command_is_a_problem():
     pressure = arrays()["pressure"].copy()
     pressure[1000:1500] = 2.5e5
-    text = problem(pressure=pressure)
-    assert (
-        "pressure_bar is constant at 2.5 bar in rows 1002 to 1501 while the command moves by"
-        in text
-    )
-    text = problem(contraction=np.full_like(pressure, 1e-3))
-    assert "contraction_mm holds one value in all rows" in text
+    words = "pressure_bar is constant at 2.5 bar in rows 1002 to 1501 while the command moves by"
+    assert words in problem(pressure=pressure)
+    still = np.full_like(pressure, 1e-3)
+    assert "contraction_mm holds one value in all rows" in problem(contraction=still)
 
 
 def test_muscle_at_rest_below_threshold_is_a_warning():
@@ -165,9 +160,7 @@ def test_clipped_channel_is_reported_with_rows():
 def test_resolution_coarser_than_noise_is_reported():
     contraction = 2e-4 * np.round(arrays()["contraction"] / 2e-4)
     text = warnings(contraction=contraction)
-    assert (
-        "contraction_mm is recorded in steps of 0.2 mm, coarser than its noise of 0.03 mm" in text
-    )
+    assert "recorded in steps of 0.2 mm, coarser than its noise of 0.03 mm" in text
     assert "digit by digit" not in text  # coarse readings repeat themselves rightly
 
 
@@ -214,7 +207,6 @@ def test_fast_recording_is_checked_before_averaging():
     pressure = command + 800.0 * rng.standard_normal(n)
     pressure[1501] += 1e5
     fast = Recording.from_arrays(np.arange(n) / 500.0, command, pressure=pressure)
-    assert fast.raw is not None
     assert "in row 1503;" in "".join(audit(fast).warnings)
 
 
@@ -241,36 +233,21 @@ def scaled(**factors: float) -> dict:
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        (
-            scaled(pressure=100.0),
-            "pressure_bar goes up to 551.3; it looks like kPa: divide by 100",
-        ),
-        (
-            scaled(pressure=14.5),
-            "pressure_bar goes up to 79.94; it looks like psi: divide by 14.504",
-        ),
-        (
-            scaled(pressure=0.1),
-            "pressure_bar never exceeds 0.551 while the command goes to 5.5 bar; it looks like "
-            "MPa: multiply by 10",
-        ),
-        (
-            scaled(pressure=1e-3),
-            "pressure_bar never exceeds 0.00551 while the command goes to 5.5 bar; no muscle runs "
-            "at this pressure",
-        ),
+        (scaled(pressure=100.0), "pressure_bar goes up to 551.3; it looks like kPa: divide by 100"),
+        (scaled(pressure=14.5), "goes up to 79.94; it looks like psi: divide by 14.504"),
+        (scaled(pressure=0.1), "command goes to 5.5 bar; it looks like MPa: multiply by 10"),
+        (scaled(pressure=1e-3), "the command goes to 5.5 bar; no muscle runs at this pressure"),
         (
             scaled(command=100.0, pressure=100.0),
-            "pressure_command_bar goes up to 550; it looks like kPa: divide by 100",
+            "command_bar goes up to 550; it looks like kPa",
         ),
         (
             scaled(command=14.5, pressure=14.5),
-            "pressure_command_bar goes up to 79.75; it looks like psi: divide by 14.504",
+            "command_bar goes up to 79.75; it looks like psi",
         ),
         (
             scaled(command=0.1),
-            "pressure_command_bar never exceeds 0.55 while the pressure goes to 5.52 bar; it "
-            "looks like MPa: multiply by 10",
+            "pressure goes to 5.52 bar; it looks like MPa: multiply by 10",
         ),
         (scaled(contraction=10.0), "more than 40% of the rest length of 200 mm; check its unit"),
         ({"contraction": 0.2 - arrays()["contraction"]}, "looks like the muscle's length"),
@@ -288,18 +265,9 @@ def test_wrong_unit_or_sign_is_a_problem(changes, text):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        (
-            scaled(command=0.0, pressure=1e-3),
-            "pressure_command_bar never exceeds 0 bar: nothing is excited",
-        ),
-        (
-            scaled(command=0.1, pressure=0.1),
-            "if the pressures are in MPa, multiply by 10",
-        ),
-        (
-            {"pressure": arrays()["pressure"] + 1.013e5},
-            "gauge pressure is expected: if it is absolute, subtract 1.013",
-        ),
+        (scaled(command=0.0, pressure=1e-3), "never exceeds 0 bar: nothing is excited"),
+        (scaled(command=0.1, pressure=0.1), "if the pressures are in MPa, multiply by 10"),
+        ({"pressure": arrays()["pressure"] + 1.013e5}, "if it is absolute, subtract 1.013"),
         (scaled(contraction=-1.0), "contraction_mm falls as the pressure rises"),
         (scaled(load=1.0 / 9.80665), "if load_N is in kilograms"),
         ({"supply": np.full(len(arrays()["time"]), 7e5)}, "supply_pressure_bar is not used"),
@@ -388,11 +356,8 @@ def test_repeats_with_different_commands_are_reported():
 
 
 def test_missing_columns_make_causes_undecidable():
-    reasons = undecidable(made(temperature=None, load=25.0, pressure=None, valve_closed=()), RIG)
-    assert reasons["payload_error"] == "the load was 25 N throughout"
-    assert "the valve was never shut" in reasons["leak"]
-    assert reasons["temperature"] == "the temperature was not recorded"
-    assert set(reasons) == {
+    found = undecidable(made(temperature=None, load=25.0, pressure=None, valve_closed=()), RIG)
+    assert set(found) == {
         *("temperature", "payload_error", "load_dependent_hysteresis"),
         *("load_dependent_compliance", "wire_slack", "leak"),
     }
@@ -403,29 +368,28 @@ def test_missing_columns_make_causes_undecidable():
     assert not {"valve_dead_band", "dead_time"} & set(reasons)
 
 
-def test_payload_error_needs_declared_tolerance():
-    reasons = undecidable(SOUND, dataclasses.replace(RIG, tolerance={}))
-    assert set(reasons) == {"payload_error"}
-    assert "add tolerance: {mass.load: 0.02} to RIG.yaml" in reasons["payload_error"]
+def unrested(cycles: int) -> Rig:
+    return dataclasses.replace(RIG, cycles_since_rest=cycles)
 
 
-NEEDY = {
-    "contraction": (made(contraction=None), RIG, "the contraction was not recorded"),
-    "pressure": (made(pressure=None), RIG, "the pressure was not recorded"),
-    "loads": (made(load=25.0), RIG, "the load was 25 N throughout"),
-    "weighed": (SOUND, Rig(), "no tolerance of the loads is declared"),
-    "temperature": (made(temperature=None), RIG, "the temperature was not recorded"),
-    "valve_closed": (made(valve_closed=()), RIG, "the valve was never shut"),
-    "rest": (SOUND, dataclasses.replace(RIG, cycles_since_rest=6), "6 cycles since it rested"),
-    "exhaust": (made(command=np.sort(arrays()["command"])), RIG, "never falls by more than"),
-}
+NEEDY = [
+    ("contraction", made(contraction=None), RIG, "the contraction was not recorded"),
+    ("pressure", made(pressure=None), RIG, "the pressure was not recorded"),
+    ("loads", made(load=25.0), RIG, "the load was 25 N throughout"),
+    ("weighed", SOUND, Rig(), "is declared; add tolerance: {mass.load: 0.02} to RIG.yaml"),
+    ("temperature", made(temperature=None), RIG, "the temperature was not recorded"),
+    ("temperature", made(temperature=np.full(len(SOUND.time), 20.0)), RIG, "varied by only 0 K"),
+    ("valve_closed", made(valve_closed=()), RIG, "the valve was never shut"),
+    ("rest", SOUND, unrested(6), "6 cycles since it rested"),
+    ("exhaust", made(command=np.sort(arrays()["command"])), RIG, "never falls by more than"),
+]
 
 
-@pytest.mark.parametrize("word", NEEDS)
-def test_requirements_of_a_users_cause_are_checked(word):
-    poor, rig, reason = NEEDY[word]
+@pytest.mark.parametrize(("word", "poor", "rig", "reason"), NEEDY)
+def test_requirements_of_a_users_cause_are_checked(word, poor, rig, reason):
+    assert {row[0] for row in NEEDY} == set(NEEDS)
     cause = Cause("gremlins", "gremlins", (), needs=(word,))
-    assert undecidable(SOUND, RIG, [cause]) == {}
+    assert undecidable(SOUND, unrested(5), [cause]) == {}
     found = undecidable(poor, rig, [cause, Cause("modest", "a modest one", ())])
     assert set(found) == {"gremlins"}
     assert reason in found["gremlins"]
@@ -438,15 +402,6 @@ def test_unknown_requirement_is_refused():
         Cause("gremlins", "gremlins", (), needs=("magic",))
     with pytest.raises(ValueError, match="give a tuple"):
         Cause("gremlins", "gremlins", (), needs="loads")
-
-
-def test_campaign_without_excitation_makes_causes_undecidable():
-    even = made(temperature=np.full(len(SOUND.time), 20.0))
-    assert "varied by only 0 K" in undecidable(even)["temperature"]
-    tired = dataclasses.replace(RIG, cycles_since_rest=6)
-    assert "6 cycles since it rested" in undecidable(SOUND, tired)["first_cycle_softening"]
-    fresh = dataclasses.replace(RIG, cycles_since_rest=5)
-    assert "first_cycle_softening" not in undecidable(SOUND, fresh)
 
 
 def test_leak_needs_more_than_two_seconds_of_closed_valve():
@@ -491,18 +446,6 @@ def test_noise_source_falls_back_to_holds_then_innovations():
     assert floor["pressure"].value == pytest.approx(800.0, rel=0.06)
     with pytest.raises(KeyError, match="contraction was not recorded"):
         floor["contraction"]
-
-
-def test_differing_repeats_are_replaced_by_holds():
-    contraction = arrays()["contraction"].copy()
-    second = SOUND.rows_of("holds_b")
-    contraction[second] += 3e-4 * np.sin(np.arange(len(second)) / 200.0)
-    floor = noise_floor(made(contraction=contraction), RIG)
-    assert floor["contraction"].source == "holds"
-    assert floor["contraction"].value == pytest.approx(3e-5, rel=0.1)
-    assert floor["contraction"].estimates["repeats"] > 1e-4
-    assert "the muscle or the rig changed between the repeats" in floor.warnings[0]
-    assert floor["pressure"].source == "repeats"
 
 
 def test_offset_between_repeats_is_not_noise():
@@ -561,10 +504,6 @@ def test_hold_ends_are_settled_and_within_one_experiment():
         assert np.ptp(before) == 0.0
         assert len(end) * PERIOD >= 1.0
     assert len(hold_ends(recording)) > 20
-
-
-def test_white_noise_ignores_motion():
-    assert white_noise(SOUND, SOUND.contraction) == pytest.approx(3e-5, rel=0.05)
 
 
 # tables

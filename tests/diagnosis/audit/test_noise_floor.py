@@ -1,8 +1,7 @@
 """Noise floor of repeats that differ by more than noise."""
 
-from __future__ import annotations
-
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,22 +13,22 @@ from tests.diagnosis.audit.test_audit import NOISE, RIG, arrays, made
 UNDECLARED = dataclasses.replace(RIG, contraction_noise=None, pressure_noise=None)
 
 
-def recorded(columns: dict) -> Recording:
-    return Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
-
-
-def changed(share: float, white: float = 1.0, slow: float = 0.0, seed: int = 0) -> Recording:
-    """Return a campaign in the second repeat of which the stroke is another.
-
-    ``share`` is the RMS of what that adds to the difference of the repeats, over that of noise.
-    """
-    columns = arrays(seed, white, slow)
+def changed(change: Callable, white: float = 1.0, slow: float = 0.0) -> Recording:
+    """Return a campaign with an effect [m] in its second repeat, a function of the command."""
+    columns = arrays(0, white, slow)
     second = made().rows_of("holds_b")
-    level = columns["command"][second] - columns["command"][second].mean()
+    columns["contraction"][second] += change(columns["command"][second])
+    return made(**columns)
+
+
+def stroke(share: float) -> Callable:
+    """Return another stroke: its RMS over that of noise in the difference of the repeats."""
     rms = np.sqrt(2.0) * NOISE["contraction"]
-    columns["contraction"] = columns["contraction"].copy()
-    columns["contraction"][second] += share * rms * level / level.std()
-    return recorded(columns)
+    return lambda command: share * rms * (command - command.mean()) / command.std()
+
+
+def drift(command: np.ndarray) -> np.ndarray:
+    return 9e-5 * np.linspace(0.0, 1.0, len(command)) ** 2
 
 
 def contraction(recording: Recording, rig: Rig) -> ChannelFloor:
@@ -37,27 +36,16 @@ def contraction(recording: Recording, rig: Rig) -> ChannelFloor:
 
 
 @pytest.mark.parametrize("rig", [RIG, UNDECLARED])
-@pytest.mark.parametrize("share", [0.7, 1.0])
-def test_effect_between_repeats_does_not_raise_noise_floor(rig, share):
-    floor = contraction(changed(share), rig)
+@pytest.mark.parametrize("change", [stroke(0.7), stroke(1.0), drift])
+def test_change_between_repeats_does_not_raise_noise_floor(rig, change):
+    both = noise_floor(changed(change), rig)
+    floor = both["contraction"]
     assert floor.estimates["repeats"] > 1.15 * NOISE["contraction"]
     assert floor.source in ("holds", "declared")
     assert floor.value == pytest.approx(NOISE["contraction"], rel=0.05)
+    assert both["pressure"].source == "repeats"
     assert "contraction: the repeats differ by more than noise" in floor.warnings[0]
     assert "the muscle or the rig changed between the repeats" in floor.warnings[0]
-
-
-@pytest.mark.parametrize("rig", [RIG, UNDECLARED])
-def test_drift_between_repeats_does_not_raise_noise_floor(rig):
-    columns = arrays()
-    second = made().rows_of("holds_b")
-    slow = 9e-5 * np.linspace(0.0, 1.0, len(second)) ** 2
-    columns["contraction"] = columns["contraction"].copy()
-    columns["contraction"][second] += slow
-    floor = contraction(recorded(columns), rig)
-    assert floor.source in ("holds", "declared")
-    assert floor.value == pytest.approx(NOISE["contraction"], rel=0.05)
-    assert "differ by more than noise" in floor.warnings[0]
 
 
 @pytest.mark.parametrize(("white", "slow", "most"), [(1.0, 0.0, 0), (0.8, 0.6, 0), (0.7, 0.7, 1)])
@@ -66,7 +54,7 @@ def test_consistent_repeats_are_used(white, slow, most):
     doubted = 0
     for seed in range(5):
         for rig in (RIG, UNDECLARED):
-            floor = noise_floor(recorded(arrays(seed, white, slow)), rig)
+            floor = noise_floor(made(**arrays(seed, white, slow)), rig)
             believed = [floor[name].source == "repeats" for name in NOISE]
             doubted += believed.count(False)
             assert len(floor.warnings) == believed.count(False)
@@ -74,7 +62,7 @@ def test_consistent_repeats_are_used(white, slow, most):
 
 
 def test_small_effect_between_repeats_counts_as_noise():
-    floor = contraction(changed(0.2), RIG)
+    floor = contraction(changed(stroke(0.2)), RIG)
     assert floor.source == "repeats"
     assert floor.warnings == ()
 
@@ -86,9 +74,8 @@ def test_noise_of_motion_counts_as_noise():
         at = made().rows_of(label)
         at = at[np.arange(len(at)) % 200 < 90]  # while the muscle moves
         rng = np.random.default_rng(len(label) + ord(label[-1]))
-        columns["contraction"] = columns["contraction"].copy()
         columns["contraction"][at] += 1.2 * NOISE["contraction"] * rng.standard_normal(len(at))
-    floor = contraction(recorded(columns), UNDECLARED)
+    floor = contraction(made(**columns), UNDECLARED)
     assert floor.estimates["repeats"] > 1.2 * floor.estimates["holds"]
     assert floor.source == "repeats"
     assert floor.warnings == ()
@@ -96,7 +83,7 @@ def test_noise_of_motion_counts_as_noise():
 
 def test_declared_noise_below_holds_is_not_used():
     sure = dataclasses.replace(RIG, contraction_noise=0.75 * NOISE["contraction"])
-    floor = contraction(changed(1.0), sure)
+    floor = contraction(changed(stroke(1.0)), sure)
     assert floor.source == "holds"
     assert floor.value == pytest.approx(NOISE["contraction"], rel=0.05)
     plain = contraction(made(), sure)
@@ -106,7 +93,7 @@ def test_declared_noise_below_holds_is_not_used():
 
 def test_declared_noise_is_used_if_holds_agree():
     """Holds miss what is slower than they last, declared noise does not."""
-    recording = changed(1.2, white=0.9, slow=0.3)
+    recording = changed(stroke(1.2), white=0.9, slow=0.3)
     floor = contraction(recording, RIG)
     assert floor.source in ("holds", "declared")
     assert floor.value == pytest.approx(

@@ -4,8 +4,6 @@ The page has three generated parts between marks. After a change of the catalogu
 ``python -m tests.diagnosis.causes.causes_page`` updates the parts.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Callable
@@ -27,7 +25,7 @@ GIVEN = {
     "regulator.max_pressure": "RIG.yaml, `regulator: {max_pressure_bar}`",
     "muscle.rest_length": "RIG.yaml, `muscle: {rest_length_mm}`",
     "muscle.diameter": "RIG.yaml, `muscle: {diameter_mm}`; only the air consumption depends on it",
-    "muscle.braid_angle": "the plant; only the air consumption depends on it",
+    "muscle.braid_angle": "the plant; only drawings depend on it",
     "muscle.braid_strain": "the plant; `braid_force` and `stiffness` are refitted with it",
     "muscle.temperature": "the recording, `temperature_C`; 20 °C without it",
     "hysteresis.creep_time_1": "the plant; four fixed times cover 0.1 to 300 s",

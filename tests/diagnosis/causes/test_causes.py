@@ -1,7 +1,5 @@
 """Catalogue of causes: completeness, documentation, effect on the plant."""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Closed-loop comparison: stepped plants, plant inverse, scores."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -34,8 +32,8 @@ from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.core.stepper import PlantBatch, PlantStepper
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import Inputs, replay
+from tests.diagnosis.conftest import needs_kernels
 
-compiled = pytest.mark.skipif(not COMPILED, reason="too many control periods for plain Python")
 LOAD = 2.0
 KELVIN = 305.0
 HIDDEN = {
@@ -73,7 +71,7 @@ def random_holds(periods: int, seed: int = 0) -> np.ndarray:
 # --- stepped plants -----------------------------------------------------------------------------
 
 
-def test_stepper_equals_replay() -> None:
+def test_stepper_equals_replay():
     plant = muscle(**HIDDEN["creep"], **{"position.delay": 0.015, "regulator.leak": 0.1})
     periods = 400 if COMPILED else 40
     commands = random_holds(periods)
@@ -88,7 +86,7 @@ def test_stepper_equals_replay() -> None:
     assert np.ptp(stepped[:, 0]) > 5e-4
 
 
-def test_trial_rollouts_leave_state_and_predict_future() -> None:
+def test_trial_rollouts_leave_state_and_predict_future():
     stepper = PlantStepper(muscle(**HIDDEN["creep"]), LOAD)
     for u in random_holds(60):
         stepper.step(u)
@@ -104,7 +102,7 @@ def test_trial_rollouts_leave_state_and_predict_future() -> None:
     assert ahead[-1, -1] - ahead[-1, 0] > 1e-4
 
 
-def test_batch_equals_single_plants() -> None:
+def test_batch_equals_single_plants():
     plants = [muscle(), muscle(**HIDDEN["creep"]), muscle(**HIDDEN["dead_time"])] * 12
     together = PlantBatch(plants, LOAD)
     commands = np.stack([random_holds(60, i) for i in range(len(plants))], axis=1)
@@ -114,7 +112,7 @@ def test_batch_equals_single_plants() -> None:
         assert np.array_equal(alone.run(commands[:, lane : lane + 1])[2, :, 0], positions[:, lane])
 
 
-def test_reset_repeats_motion_and_noise() -> None:
+def test_reset_repeats_motion_and_noise():
     stepper = PlantStepper(muscle(), LOAD, noise_seed=3)
     first = [stepper.step(3e5) for _ in range(50)]
     stepper.reset(3)
@@ -125,7 +123,7 @@ def test_reset_repeats_motion_and_noise() -> None:
     assert apart == pytest.approx(np.sqrt(2.0) * stepper.noise, rel=0.35)
 
 
-def test_unsupported_plants_are_refused() -> None:
+def test_unsupported_plants_are_refused():
     with pytest.raises(ValueError, match=r"period = 0\.02"):
         PlantStepper(muscle(), LOAD, period=0.02)
     with pytest.raises(ValueError, match="one hysteresis"):
@@ -135,29 +133,29 @@ def test_unsupported_plants_are_refused() -> None:
 # --- the controller -----------------------------------------------------------------------------
 
 
-def test_crossing_is_the_zero_nearest_the_middle() -> None:
+def test_crossing_is_the_zero_nearest_the_middle():
     slopes = np.arange(-3.0, 4.0)
     assert crossing(slopes, slopes - 0.5, 3) == pytest.approx(0.5)
     twice = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
     assert crossing(slopes, twice, 3) == pytest.approx(0.5)
 
 
-def test_without_zero_crossing_the_gentlest_best_slope_is_used() -> None:
+def test_without_zero_crossing_the_gentlest_best_slope_is_used():
     slopes = np.arange(-3.0, 4.0)
     assert crossing(slopes, np.ones(7), 3) == 0.0
     assert crossing(slopes, np.maximum(slopes, 1.0), 3) == 0.0
     assert crossing(slopes, 5.0 - slopes, 3) == 3.0
 
 
-@compiled
-def test_dead_time_is_measured_from_the_response() -> None:
+@needs_kernels
+def test_dead_time_is_measured_from_the_response():
     late = PlantStepper(muscle(**{"regulator.dead_time": 0.06}), LOAD)
     assert dead_periods(late) == dead_periods(PlantStepper(muscle(), LOAD)) + 5
 
 
-@compiled
+@needs_kernels
 @pytest.mark.parametrize("cause", HIDDEN | SLOW)
-def test_plant_inverse_tracks_reference(cause: str) -> None:
+def test_plant_inverse_tracks_reference(cause):
     plant = muscle(**(HIDDEN | SLOW)[cause], **{"muscle.temperature": KELVIN})
     model = PlantStepper(plant, LOAD)
     reference = short(stroke(model), 6.0)["sines"]
@@ -173,8 +171,8 @@ def test_plant_inverse_tracks_reference(cause: str) -> None:
     assert rms[1] > 4.0 * rms[0]
 
 
-@compiled
-def test_feedback_corrects_model_error() -> None:
+@needs_kernels
+def test_feedback_corrects_model_error():
     plant, rig = muscle(), PlantStepper(muscle(**{"regulator.gain": 0.9}), LOAD)
     controller = design(plant)
     silent = InversePi(controller.inverse, 0.0, 0.0)
@@ -184,7 +182,7 @@ def test_feedback_corrects_model_error() -> None:
     assert controller.integral > 0.0
 
 
-def test_integral_stops_at_setpoint_limit() -> None:
+def test_integral_stops_at_setpoint_limit():
     full, error = 6e5, np.array([1e-3, -1e-3, 1e-3])
     total, forward = np.array([1e4, 1e4, 1e4]), np.array([5.95e5, 6e5, 3e5])
     output, after = correction(error, total, forward, 1e7, 1e6, full)
@@ -196,8 +194,8 @@ def test_integral_stops_at_setpoint_limit() -> None:
     assert correction(1.0, 0.0, 0.0, 0.0, 1e9, full)[0] == pytest.approx(AUTHORITY * full)
 
 
-@compiled
-def test_unreachable_reference_causes_no_windup() -> None:
+@needs_kernels
+def test_unreachable_reference_causes_no_windup():
     plant = muscle()
     stepper, controller = PlantStepper(plant, LOAD), design(plant)
     top = stroke(stepper)
@@ -210,49 +208,46 @@ def test_unreachable_reference_causes_no_windup() -> None:
 # --- the comparison -----------------------------------------------------------------------------
 
 
-@compiled
+@needs_kernels
 @pytest.mark.parametrize("cause", HIDDEN)
-def test_knowledge_of_the_cause_reduces_tracking_error(cause: str) -> None:
+def test_knowledge_of_the_cause_reduces_tracking_error(cause):
     true = muscle(**HIDDEN[cause])
     rig = PlantStepper(true, LOAD, 0, kelvin=KELVIN)
     found = closed_loop(
         muscle(), true, rig=rig, references=short(stroke(rig)), load=LOAD, kelvin=KELVIN
     )
-    assert found is not None
     better = found["better_percent"]
     assert better["value"] > 40.0
     assert 0.0 < better["interval"][0] <= better["value"] <= better["interval"][1]
     assert cause in COMPENSABLE
 
 
-@compiled
-def test_equal_plants_have_equal_errors() -> None:
+@needs_kernels
+def test_equal_plants_have_equal_errors():
     found = closed_loop(muscle(), muscle(), references=short(0.01), load=LOAD)
-    assert found is not None
     assert found["better_percent"] == {"value": 0.0, "interval": [0.0, 0.0]}
     assert found["recovered"] is None and found["oracle"] is None
     assert "no significant difference" in found["text"]
 
 
-@compiled
-def test_same_arguments_give_the_same_report() -> None:
+@needs_kernels
+def test_same_arguments_give_the_same_report():
     true = muscle(**HIDDEN["dead_time"])
     one, two = (closed_loop(muscle(), true, references=short(0.01, 6.0), load=LOAD) for _ in "ab")
     assert one == two
 
 
-@compiled
-def test_oracle_equal_to_extended_plant_has_no_gap() -> None:
+@needs_kernels
+def test_oracle_equal_to_extended_plant_has_no_gap():
     true = muscle(**HIDDEN["dead_time"])
     found = closed_loop(muscle(), true, oracle=true, references=short(0.01, 6.0), load=LOAD)
-    assert found is not None
     assert found["recovered"] == pytest.approx(1.0)
     assert found["oracle"]["value"] == found["after"]["value"]
     assert "Designed on the rig itself" in found["text"]
 
 
-@compiled
-def test_plant_without_stroke_gives_no_comparison() -> None:
+@needs_kernels
+def test_plant_without_stroke_gives_no_comparison():
     weak = muscle(**{"regulator.supply_pressure": 5e4, "hysteresis.threshold": 1e5})
     assert closed_loop(muscle(), weak, load=LOAD) is None
 
@@ -271,7 +266,7 @@ class Holding:
         return 0.5 * self.plant.regulator.max_pressure
 
 
-def test_design_routine_receives_plants_of_the_runs() -> None:
+def test_design_routine_receives_plants_of_the_runs():
     made: list[Holding] = []
 
     def hold_the_middle(plant: SingleMuscle) -> Holding:
@@ -288,7 +283,7 @@ def test_design_routine_receives_plants_of_the_runs() -> None:
         load=LOAD,
         kelvin=KELVIN,
     )
-    assert found is not None and found["controller"] == "hold the middle"
+    assert found["controller"] == "hold the middle"
     for controller in made:
         plant = controller.plant
         assert plant.value("mass.load") == LOAD
@@ -299,8 +294,8 @@ def test_design_routine_receives_plants_of_the_runs() -> None:
     assert found["better_percent"]["value"] == 0.0
 
 
-@compiled
-def test_residual_seed_and_default_references() -> None:
+@needs_kernels
+def test_residual_seed_and_default_references():
     residuals = Residuals(np.random.default_rng(1).normal(0.0, 5e-5, 500), 0.02)
     reports = [
         closed_loop(muscle(), muscle(), Holding, residuals=residuals, load=LOAD, seed=seed)
@@ -313,7 +308,7 @@ def test_residual_seed_and_default_references() -> None:
     assert reports[0]["before"]["value"] == pytest.approx(np.sqrt(np.mean(squares)))
 
 
-def test_residuals_are_added_to_reading_and_position() -> None:
+def test_residuals_are_added_to_reading_and_position():
     trace = np.linspace(1e-4, 2e-4, 200)
     plain, moved = ReplayedRig(muscle(), None), ReplayedRig(muscle(), Residuals(trace, 0.02))
     still = PlantStepper(muscle(), LOAD)
@@ -329,7 +324,7 @@ def test_residuals_are_added_to_reading_and_position() -> None:
     assert plain.position == still.position
 
 
-def test_resampled_residuals_are_pieces_of_the_series() -> None:
+def test_resampled_residuals_are_pieces_of_the_series():
     residuals = Residuals(np.arange(500.0), 0.02)
     drawn = residuals.resampled(7, 0.01, 1000)
     assert np.array_equal(drawn, residuals.resampled(7, 0.01, 1000))
@@ -339,7 +334,7 @@ def test_resampled_residuals_are_pieces_of_the_series() -> None:
     assert len(Residuals(np.ones(10), 0.02).resampled(0, 0.01, 300)) == 300
 
 
-def test_references_start_at_rest_and_are_within_reach() -> None:
+def test_references_start_at_rest_and_are_within_reach():
     for name, path in fixed_references(0.02).items():
         settled = path[200:]
         assert path[0] == 0.0
@@ -349,7 +344,7 @@ def test_references_start_at_rest_and_are_within_reach() -> None:
         assert np.abs(np.diff(path)).max() < 0.02 * 1.4 * 0.01, name
 
 
-def test_scores_of_known_errors() -> None:
+def test_scores_of_known_errors():
     errors = np.concatenate([np.full(200, 9.0), np.full(400, 2e-3)])
     squares = segment_squares(errors, 0.01)
     assert squares == pytest.approx([4e-6, 4e-6])
@@ -361,7 +356,7 @@ def test_scores_of_known_errors() -> None:
     assert scores(table[[1, 1, 1]], ["one"], 0)["recovered"] is None
 
 
-def test_bootstrap_of_segments_is_paired() -> None:
+def test_bootstrap_of_segments_is_paired():
     rng = np.random.default_rng(0)
     squares = rng.lognormal(0.0, 2.0, (1, 30)) * 1e-8
     found = scores(np.array([squares, 0.81 * squares]), ["one"], 0)
@@ -370,7 +365,7 @@ def test_bootstrap_of_segments_is_paired() -> None:
     assert low < 0.8 * found["before"]["value"] < found["before"]["value"] < high
 
 
-def test_sentence_matches_the_numbers() -> None:
+def test_sentence_matches_the_numbers():
     squares = np.array([[[4e-8] * 5], [[1e-8] * 5], [[0.64e-8] * 5]])
     found = {**scores(squares, ["one"], 0), "where": "the rig"}
     text = sentence(found)
@@ -379,7 +374,7 @@ def test_sentence_matches_the_numbers() -> None:
     assert "100 % more" in worse and "Designed on the rig itself" not in worse
 
 
-def test_position_sensor_errors_are_not_compensable() -> None:
+def test_position_sensor_errors_are_not_compensable():
     assert "payload_error" in COMPENSABLE
     never = {"sensor_bias", "sensor_drift", "sensor_nonlinearity", "slip_step", "stick_slip"}
     assert not never & set(COMPENSABLE)

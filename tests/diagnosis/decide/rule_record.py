@@ -3,8 +3,6 @@
 ``python -m tests.diagnosis.decide.rule_record`` writes the record of the present version.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from pathlib import Path

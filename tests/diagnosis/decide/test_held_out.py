@@ -1,7 +1,5 @@
 """Held-out data, confidence intervals, reasons of rivals, on plain numbers."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 
@@ -35,7 +33,7 @@ def blocks_of(record: Any) -> Blocks:
     return Blocks.make(record.time, np.zeros((1, len(record.time))))
 
 
-def test_whole_kinds_are_held_out() -> None:
+def test_whole_kinds_are_held_out():
     record = recording("sine_a", "steps", "sine_b", "ramp", "holds")
     choice = choose(record, blocks_of(record))
     assert choice.by == "kinds"
@@ -47,7 +45,7 @@ def test_whole_kinds_are_held_out() -> None:
 
 
 @pytest.mark.parametrize("labels", [("a",), ("sine", "steps"), ("run1", "run2", "run3", "run4")])
-def test_blocks_are_held_out_with_too_few_kinds(labels: tuple[str, ...]) -> None:
+def test_blocks_are_held_out_with_too_few_kinds(labels):
     record = recording(*labels, seconds=60.0)
     blocks = blocks_of(record)
     choice = choose(record, blocks)
@@ -63,10 +61,10 @@ def held(blocks: int) -> HeldOut:
     errors = rng.uniform(40.0, 60.0, (2, 1, blocks))
     before, after = (Candidate((), Fit((), np.zeros(0), np.zeros(0)), e) for e in errors)
     choice = Choice(np.ones(len(of), bool), "blocks")
-    return HeldOut(choice, None, part, 0, before, after)  # type: ignore[arg-type]
+    return HeldOut(choice, None, part, 0, before, after)
 
 
-def test_gain_interval_needs_enough_blocks() -> None:
+def test_gain_interval_needs_enough_blocks():
     many, few = held(LEAST_BLOCKS), held(LEAST_BLOCKS - 1)
     found = many.gain(many.base, many.model)
     low, high = found["interval"]
@@ -90,14 +88,7 @@ def free(log: bool = False) -> Free:
         (100.0, 0.7, True, (25.36, 394.3), False, True),
     ],
 )
-def test_wide_intervals_are_flagged(
-    value: float,
-    sd: float,
-    log: bool,
-    ends: tuple[float | None, float | None],
-    at_bound: bool,
-    not_identified: bool,
-) -> None:
+def test_wide_intervals_are_flagged(value, sd, log, ends, at_bound, not_identified):
     found = span(free(log), value, free(log).inner(value), 1.96 * sd)
     for end, expected in zip(found["interval"], ends, strict=True):
         assert end == (None if expected is None else pytest.approx(expected, rel=1e-3))
@@ -115,7 +106,7 @@ def row(c: Candidate, gain: float, better: float, imitates: bool = False) -> dic
     return made | {"imitates": imitates}
 
 
-def test_reasons_of_rivals_match_the_decision() -> None:
+def test_reasons_of_rivals_match_the_decision():
     best, close, like, weak, worse = (
         candidate(n) for n in ("leak", "creep", "resonance", "temperature", "wire_slack")
     )
@@ -128,13 +119,13 @@ def test_reasons_of_rivals_match_the_decision() -> None:
     ]
     evidence = {"levels": [{"rivals": []}, {"rivals": rows}]}
     rivals = [best, close, like, weak, worse]
-    found = reasons(Decision("ambiguous", best, rivals, [close], {}, evidence), Rule())
+    found = reasons(Decision("ambiguous", best, rivals, [close], evidence), Rule())
     assert found == ["the best", "not excluded", "imitates it", "gains less", "surely worse"]
     assert [word in EXCLUDED for word in found] == [False, False, False, True, True]
 
 
-def test_without_a_named_cause_no_rival_gains_enough() -> None:
+def test_without_a_named_cause_no_rival_gains_enough():
     rival = candidate("leak")
     evidence = {"levels": [{"rivals": []}, {"rivals": [row(rival, 0.01, 1.0)]}]}
-    decision = Decision("adequate", candidate(), [rival], [], {}, evidence)
+    decision = Decision("adequate", candidate(), [rival], [], evidence)
     assert reasons(decision, Rule()) == ["gains too little"]

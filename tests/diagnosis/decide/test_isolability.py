@@ -1,13 +1,11 @@
 """Isolability and testability of causes on a recording."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
 import pytest
 
-from pam_envs.data.recording.recording import Recording, Rig
+from benchmarks.diagnosis.cases import recording_of, sheet_of
 from pam_envs.diagnosis.audit.noise import noise_floor
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.causes import by_name, catalogue
@@ -16,7 +14,6 @@ from pam_envs.diagnosis.decide.isolability import (
     Isolability,
     ends,
     isolability,
-    lookalikes,
     not_testable,
     too_few_testable,
 )
@@ -24,49 +21,28 @@ from pam_envs.diagnosis.diagnosis import Study
 from pam_envs.diagnosis.fit.candidate import initial_fits
 from pam_envs.diagnosis.fit.single_muscle import start_plant
 from pam_envs.diagnosis.fit.tolerance import load_error_limit, may_be_within, refit_load
-from pam_envs.kernels.build import COMPILED
 from tests.diagnosis import hidden
 from tests.diagnosis.causes import users_cause
-
-needs_kernels = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
-BAR = 1e5
+from tests.diagnosis.conftest import base_of, needs_kernels
 
 
 def study_of(**changes: object) -> Study:
     """Return the base, refitted to a clean rig."""
-    base, campaign = hidden.draw_base(np.random.default_rng(3)), hidden.campaign_short(1)
+    base, campaign = base_of(3), hidden.campaign_short(1)
+    sheet = sheet_of(base, campaign)
     columns = hidden.make_recording(base, [], campaign, noise_seed=5)
-    file = hidden.rig_yaml(base, campaign)
-    sheet = Rig(
-        rest_length=1e-3 * file["muscle"]["rest_length_mm"],
-        diameter=1e-3 * file["muscle"]["diameter_mm"],
-        max_pressure=6e5,
-        contraction_noise=4.5e-5,
-        pressure_noise=1260.0,
-        valve_closed=tuple(file["valve_closed"]),
-        tolerance=file["tolerance"],
-    )
-    recording = Recording.from_arrays(
-        columns["time_s"],
-        columns["pressure_command_bar"] * BAR,
-        pressure=columns["pressure_bar"] * BAR,
-        contraction=columns["contraction_mm"] * 1e-3,
-        load=columns["load_N"],
-        temperature=columns["temperature_C"],
-        segment=columns["segment"].tolist(),
-        valve_closed=sheet.valve_closed,
-    )
+    recording = recording_of(columns, sheet, "clean")
     recording = dataclasses.replace(recording, **changes)
     return Study.begin(recording, sheet, start_plant(sheet), noise_floor(recording, sheet))
 
 
 @pytest.fixture(scope="module")
-def study() -> Study:
+def study():
     return study_of()
 
 
 @pytest.fixture(scope="module")
-def blind() -> Study:
+def blind():
     return study_of(pressure=None)
 
 
@@ -74,10 +50,11 @@ def of(study: Study, causes: list[Cause]) -> Isolability:
     return isolability(study.problem, study.family, study.base.fit, causes)
 
 
-def reasons_of(study: Study, causes: list[Cause]) -> dict[str, str]:
-    return not_testable(
-        study.problem, study.family, study.base.fit, causes, study.recording, study.sheet
-    )[1]
+def reasons_of(study: Study, causes: list[Cause], **changes: object) -> dict[str, str]:
+    """Return why causes are not testable on a recording with some columns changed."""
+    recording = dataclasses.replace(study.recording, **changes)
+    given = (study.problem, study.family, study.base.fit, causes)
+    return not_testable(*given, recording, study.sheet)[1]
 
 
 def cause_of(name: str, parameter: str, start: float, **bounds: float) -> Cause:
@@ -91,15 +68,13 @@ def test_largest_effect_is_at_the_bounds(study):
     narrow = cause_of("narrow", "position.bias", 1e-7, low=-1e-6, high=1e-6)
     wide = cause_of("wide", "position.bias", 1e-7, low=-1e-6, high=5e-4)
     below = cause_of("below", "position.bias", 1e-7, low=-5e-4, high=1e-6)
-    reach = dict(
-        zip(("narrow", "wide", "below"), of(study, [narrow, wide, below]).reach, strict=True)
-    )
-    assert reach["narrow"] < 0.03
-    assert reach["wide"] == pytest.approx(500.0 * reach["narrow"], rel=1e-3)
-    assert reach["below"] == pytest.approx(reach["wide"], rel=1e-6)
+    little, up, down = of(study, [narrow, wide, below]).reach
+    assert little < 0.03
+    assert up == pytest.approx(500.0 * little, rel=1e-3)
+    assert down == pytest.approx(up, rel=1e-6)
     reasons = reasons_of(study, [narrow, wide, below])
     assert set(reasons) == {"narrow"}
-    assert f"shows at most {reach['narrow']:.2g} times the noise" in reasons["narrow"]
+    assert f"shows at most {little:.2g} times the noise" in reasons["narrow"]
 
 
 @needs_kernels
@@ -144,12 +119,8 @@ def test_ineffective_form_is_not_testable(study):
     reasons = reasons_of(study, list(catalogue()))
     left = {c.name for c in catalogue()} - set(reasons)
     assert {"creep", "leak", "temperature", "sensor_bias", "stick_slip"} <= left
-    empty = dataclasses.replace(
-        study.recording, load=np.zeros(len(study.recording.time)), temperature=None
-    )
-    lacking = not_testable(
-        study.problem, study.family, study.base.fit, catalogue(), empty, study.sheet
-    )[1]
+    unloaded = np.zeros(len(study.recording.time))
+    lacking = reasons_of(study, list(catalogue()), load=unloaded, temperature=None)
     assert lacking["payload_error"] == "the load was 0 N throughout"
     assert lacking["temperature"] == "the temperature was not recorded"
 
@@ -157,10 +128,7 @@ def test_ineffective_form_is_not_testable(study):
 @needs_kernels
 def test_users_cause_is_judged_like_shipped_ones(study):
     assert reasons_of(study, [users_cause.CAUSE]) == {}
-    one_load = dataclasses.replace(study.recording, load=np.full(len(study.recording.time), 20.0))
-    reasons = not_testable(
-        study.problem, study.family, study.base.fit, [users_cause.CAUSE], one_load, study.sheet
-    )[1]
+    reasons = reasons_of(study, [users_cause.CAUSE], load=np.full(len(study.recording.time), 20.0))
     assert reasons == {"sprung_load": "the load was 20 N throughout"}
 
 
@@ -178,22 +146,6 @@ def test_without_pressure_similar_causes_are_not_testable(blind, study):
     bow = cause_of("bow", "pressure.bow", 0.01)
     assert "shows at most 0 times" in reasons_of(blind, [bow, by_name("leak")])["bow"]
     assert reasons_of(study, [bow]) == {}
-
-
-@needs_kernels
-def test_without_pressure_valve_causes_are_isolable_or_listed(blind):
-    causes = list(catalogue())
-    found, reasons = not_testable(
-        blind.problem, blind.family, blind.base.fit, causes, blind.recording, blind.sheet
-    )
-    valve = [c.name for c in causes if c.in_valve]
-    assert set(valve) <= {*found.names, *reasons}
-    alike = lookalikes(found, causes)
-    assert set(alike) <= set(reasons)
-    for name in valve:
-        if name not in reasons:
-            cosines = np.delete(found.cosine[found.names.index(name)], found.names.index(name))
-            assert cosines.max() < 0.9
 
 
 def test_load_error_is_compared_with_its_tolerance():

@@ -1,7 +1,5 @@
 """Decision rule on plain evidence, kinds of experiment, spectral peaks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -71,21 +69,19 @@ BOTH = rival("leak", "creep", gain=1.3, better=1.0)
         (evidence(level(3.0, LEAK), level(3.08, BOTH, added=0.08, possible=0.1)), "named", 1),
     ],
 )
-def test_verdict_follows_from_evidence(found: dict[str, Any], verdict: str, names: int) -> None:
+def test_verdict_follows_from_evidence(found, verdict, names):
     judged = judge(found, RULE)
     assert (judged.verdict, judged.level) == (verdict, names)
 
 
 @pytest.mark.parametrize(("blocks", "verdict"), [(25, "named"), (10, "adequate")])
-def test_few_blocks_require_a_larger_gain(blocks: int, verdict: str) -> None:
+def test_few_blocks_require_a_larger_gain(blocks, verdict):
     found = evidence(level(0.2, LEAK)) | {"blocks": blocks}
     assert judge(found, RULE).verdict == verdict
 
 
 @pytest.mark.parametrize(("after", "verdict"), [(2.0, "named"), (6.0, "unexplained")])
-def test_remaining_structure_decides_between_named_and_unexplained(
-    after: float, verdict: str
-) -> None:
+def test_remaining_structure_decides_between_named_and_unexplained(after, verdict):
     found = evidence(level(1.0, LEAK, left=left(excess=after)), before=left(excess=10.0))
     assert judge(found, RULE).verdict == verdict
 
@@ -104,12 +100,12 @@ def test_remaining_structure_decides_between_named_and_unexplained(
         ("7", "7"),
     ],
 )
-def test_label_gives_kind_of_experiment(label: str, kind: str) -> None:
+def test_label_gives_kind_of_experiment(label, kind):
     assert kind_of(label) == kind
 
 
 @pytest.mark.parametrize("seconds", [30, 60, 120, 300])
-def test_spectrum_of_white_noise_has_no_peak_unlike_that_of_a_hum(seconds: int) -> None:
+def test_spectrum_of_white_noise_has_no_peak_unlike_that_of_a_hum(seconds):
     period = 0.02
     time = np.arange(round(seconds / period)) * period
     for seed in range(20):
@@ -146,15 +142,15 @@ def compared(
 
 
 @pytest.mark.parametrize("slow", [0.0, 0.5])
-def test_removed_sine_has_a_small_p_value(slow: float) -> None:
+def test_removed_sine_has_a_small_p_value(slow):
     assert compared(1.0, slow, 1) < 1e-3
 
 
 @pytest.mark.parametrize("slow", [0.0, 0.5])
-def test_absent_sine_is_seldom_significant(slow: float) -> None:
+def test_absent_sine_is_seldom_significant(slow):
     found = [compared(0.1, slow, seed, there=False) for seed in range(60)]
     assert sum(value <= RULE.doubt for value in found) <= 1
 
 
-def test_longer_data_lower_the_p_value() -> None:
+def test_longer_data_lower_the_p_value():
     assert compared(0.3, 0.5, 3, seconds=600) < compared(0.3, 0.5, 3, seconds=60)

@@ -1,7 +1,5 @@
 """Design of the next experiment: capabilities of a rig, separation of rivals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -18,9 +16,7 @@ from pam_envs.diagnosis.experiment.experiment import (
 from pam_envs.diagnosis.experiment.plans import PERIOD, Means, plans
 from pam_envs.diagnosis.fit.least_squares import Fit
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, start_plant
-from pam_envs.kernels.build import COMPILED
-
-compiled = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
+from tests.diagnosis.conftest import needs_kernels
 
 PLANT = start_plant(Rig(rest_length=0.2))
 NOISE = np.array([5e-5, 1e3])
@@ -112,7 +108,7 @@ def test_segments_describe_the_commands():
             at += n
 
 
-@compiled
+@needs_kernels
 def test_missing_sensor_gives_no_separation():
     plain, bowed = rival("plain"), rival("sensor_nonlinearity", pressure__bow=0.05)
     inputs = inputs_of(plans(ABLE)[0])
@@ -123,7 +119,7 @@ def test_missing_sensor_gives_no_separation():
     assert not proposed(plain, bowed, noise=np.array([5e-5, np.inf]))["enough"]
 
 
-@compiled
+@needs_kernels
 def test_refittable_difference_is_no_separation():
     """More of the same cause is no other cause, however large the difference."""
     little = rival("leak", {"regulator.leak": 0.0101}, regulator__leak=0.01)
@@ -139,7 +135,7 @@ def test_refittable_difference_is_no_separation():
     assert free < 1e-3 * stiff
 
 
-@compiled
+@needs_kernels
 def test_closing_the_valve_is_proposed_for_a_leak_if_possible():
     leak = rival("leak", {"regulator.leak": 0.011}, regulator__leak=0.01)
     creep = rival("creep", {"hysteresis.creep_2": 0.011}, hysteresis__creep_2=0.01)
@@ -155,7 +151,7 @@ def test_closing_the_valve_is_proposed_for_a_leak_if_possible():
     assert by_name("creep").sensor in able["sensor"]
 
 
-@compiled
+@needs_kernels
 def test_nearest_rival_decides():
     """Each rival alone has its best experiment; for all of them the least one counts."""
     leak = rival("leak", regulator__leak=0.01)
@@ -171,7 +167,7 @@ def test_nearest_rival_decides():
     )
 
 
-@compiled
+@needs_kernels
 def test_inseparable_rivals_are_reported():
     one = rival("sensor_bias", position__bias=1e-3)
     other = rival("sensor_drift", position__bias=2e-3)

@@ -1,7 +1,5 @@
 """Simulation-error least squares: optimum, bounds, priors, shared Jacobians, intervals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -66,14 +64,14 @@ def fitted(problem: Problem, *frees: Free, rounds: int = 30) -> Fit:
     return fit
 
 
-def test_noise_free_fit_recovers_parameters() -> None:
+def test_noise_free_fit_recovers_parameters():
     fit = fitted(problem_of(np.zeros((2, len(TIME)))), GAIN, LAG, SLOPE)
     found = fit.values()
     assert [found["gain"], found["lag"], found["slope"]] == pytest.approx(TRUTH[:3], rel=1e-4)
     assert fit.cost < 1e-4
 
 
-def test_fit_stops_at_bound() -> None:
+def test_fit_stops_at_bound():
     narrow = replace(GAIN, high=1.5, start=1.0)
     fit = fitted(problem_of(drawn(1)), narrow, LAG, SLOPE)
     assert fit.values()["gain"] == 1.5
@@ -81,7 +79,7 @@ def test_fit_stops_at_bound() -> None:
     assert fit.cost > free.cost
 
 
-def test_prior_determines_unidentified_parameter() -> None:
+def test_prior_determines_unidentified_parameter():
     train = np.zeros(len(TIME), bool)
     train[:40] = True  # the drift has not begun
     prior = replace(SLOPE, start=0.1, prior=1e-4)
@@ -91,7 +89,7 @@ def test_prior_determines_unidentified_parameter() -> None:
     assert abs(free.values()["slope"] - 0.1) > 5e-3
 
 
-def test_held_out_samples_do_not_change_fit() -> None:
+def test_held_out_samples_do_not_change_fit():
     train = TIME < 40.0
     noise = drawn(3)
     one = fitted(problem_of(noise, train), GAIN, LAG, SLOPE)
@@ -102,7 +100,7 @@ def test_held_out_samples_do_not_change_fit() -> None:
     assert np.abs(one.residual - other.residual).max() > 10.0
 
 
-def test_missing_readings_are_ignored() -> None:
+def test_missing_readings_are_ignored():
     problem = problem_of(drawn(4))
     measured = problem.measured.copy()
     measured[0, 500:900] = np.nan
@@ -111,7 +109,7 @@ def test_missing_readings_are_ignored() -> None:
     assert fit.values()["gain"] == pytest.approx(2.0, abs=0.02)
 
 
-def test_diverged_simulation_is_never_selected() -> None:
+def test_diverged_simulation_is_never_selected():
     def breaks(columns: Array) -> Array:
         outputs = simulate(columns)
         outputs[:, :, columns[:, 0] > 1.5] = np.nan
@@ -122,7 +120,7 @@ def test_diverged_simulation_is_never_selected() -> None:
     assert np.abs(fit.residual).max() < WORST
 
 
-def test_shared_jacobian_reaches_the_same_optimum() -> None:
+def test_shared_jacobian_reaches_the_same_optimum():
     problem = problem_of(drawn(6) + np.array([[0.4], [0.0]]))
     base = fitted(problem, GAIN, LAG, SLOPE)
     differentiate(problem, [base])
@@ -139,7 +137,7 @@ def test_shared_jacobian_reaches_the_same_optimum() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_bounded_step_equals_bounded_least_squares(seed: int) -> None:
+def test_bounded_step_equals_bounded_least_squares(seed):
     rng = np.random.default_rng(seed)
     slopes, target = rng.standard_normal((40, 6)), rng.standard_normal(40)
     low, high = -0.1 * rng.random(6), 0.1 * rng.random(6)
@@ -153,7 +151,7 @@ def test_bounded_step_equals_bounded_least_squares(seed: int) -> None:
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
-def test_confidence_intervals_have_nominal_coverage(correlation: float) -> None:
+def test_confidence_intervals_have_nominal_coverage(correlation):
     hits = np.zeros(3)
     draws = 60
     for seed in range(draws):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 Shape = dict[str, float]
-Draw = tuple[float, float] | Callable[[np.random.Generator], float]
+Draw = Sequence[Any]
 Write = str | Callable[[np.ndarray, float, Shape], None]
 
 
@@ -41,8 +42,9 @@ class Effect:
 class Kind:
     """A kind of effect: its entry in a record, reference strength (within 25 %) and shape.
 
-    A shape is drawn from a range or by a function. It is written by a function of record, strength
-    and shape, or, with the name of the constant of the strength, under its own names.
+    A shape is drawn from a range, or as its first entry names (:data:`DRAWS`). It is written by a
+    function of record, strength and shape, or, with the name of the constant of the strength, under
+    its own names.
     """
 
     write: Write
@@ -53,10 +55,7 @@ class Kind:
     def effect(self, name: str, rng: np.random.Generator) -> Effect:
         """Draw one effect of this kind."""
         reference = self.reference * float(rng.uniform(0.8, 1.25))
-        shape = {
-            key: uniform(rng, *draw) if isinstance(draw, tuple) else draw(rng)
-            for key, draw in self.shape.items()
-        }
+        shape = {key: drawn(rng, *draw) for key, draw in self.shape.items()}
         return Effect(name, shape, reference, self.exponent, self.write)
 
 
@@ -65,19 +64,19 @@ def uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(rng.uniform(low, high))
 
 
-def sign(rng: np.random.Generator) -> float:
-    """Draw -1 or 1."""
-    return float(rng.choice([-1.0, 1.0]))
+DRAWS: dict[str, Callable[..., Any]] = {
+    "sign": lambda rng: rng.choice([-1.0, 1.0]),
+    "coin": lambda rng, share=0.5: rng.random() < share,
+    "whole": lambda rng, low, high: rng.integers(low, high),
+    "log_uniform": lambda rng, low, high: np.exp(uniform(rng, np.log(low), np.log(high))),
+    "either": lambda rng, *ranges: rng.choice([uniform(rng, *ends) for ends in ranges]),
+}
+"""-1 or 1; 1 or 0; an integer below ``high``; even in the logarithm; from one of two ranges."""
 
 
-def coin(rng: np.random.Generator, share: float = 0.5) -> float:
-    """Draw 1 with the given probability, else 0."""
-    return float(rng.random() < share)
-
-
-def whole(low: int, high: int) -> Draw:
-    """Return the draw of an integer from ``low`` to below ``high``."""
-    return lambda rng: float(rng.integers(low, high))
+def drawn(rng: np.random.Generator, how: str | float, *given: Any) -> float:
+    """Draw a plain float."""
+    return float(DRAWS[how](rng, *given)) if isinstance(how, str) else uniform(rng, how, *given)
 
 
 def put(record: np.ndarray, **values: float) -> None:

@@ -1,7 +1,5 @@
 """Reader of a report page."""
 
-from __future__ import annotations
-
 from html.parser import HTMLParser
 
 SECTIONS = {

@@ -1,42 +1,31 @@
 """Page of a diagnosis and its figures."""
 
-from __future__ import annotations
-
-import json
 import re
-from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
 
 from pam_envs.diagnosis.figures import draw
-from pam_envs.diagnosis.figures.matrix import alike
+from pam_envs.diagnosis.figures.of_report import alike
 from pam_envs.diagnosis.figures.quantities import View, elapsed, envelope, worst_window
 from pam_envs.diagnosis.report import page as page_module
 from pam_envs.diagnosis.report.page import headline, page
 from pam_envs.diagnosis.report.page_parts import number
-from pam_envs.diagnosis.report.report import report_json
 from tests.diagnosis.report import report_fakes as fakes
 from tests.diagnosis.report.page_reader import SECTIONS, Page
-
-SCHEMA = json.loads(
-    (Path(__file__).parents[2] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
-)
 
 
 @pytest.fixture(scope="module")
 def html():
     made = fakes.diagnosis("named")
-    return page(json.loads(report_json(made.report)), made.traces)
+    return page(fakes.stored(made.report), made.traces)
 
 
 def test_page_does_not_show_the_runtime(monkeypatch):
     monkeypatch.setattr(page_module, "draw", lambda *_: {})
     made = fakes.diagnosis("named")
-    quick, slow = (
-        json.loads(report_json(made.report | {"runtime_s": seconds})) for seconds in (0.5, 99.0)
-    )
+    quick, slow = (fakes.stored(made.report | {"runtime_s": seconds}) for seconds in (0.5, 99.0))
     assert page(slow, made.traces) == page(quick, made.traces)
 
 
@@ -85,7 +74,7 @@ def test_text_from_users_is_escaped():
     made.report["isolability"]["names"][0] = evil
     made.report["rivals"][2]["name"] = made.report["rivals"][2]["title"] = evil
     made.traces.segments = (evil, "階段", *made.traces.segments[2:-1], evil)
-    read = Page(page(json.loads(report_json(made.report)), made.traces))
+    read = Page(page(fakes.stored(made.report), made.traces))
     assert "script" not in read.tags
     assert "onload" not in read.attributes
     assert read.text.count(evil) >= 6
@@ -109,8 +98,7 @@ def test_page_of_a_single_output(channel):
         made.report[key][other] = None
     made.report["residual_structure"]["before"][other] = None
     made.report["residual_structure"]["after"][other] = None
-    found = json.loads(report_json(made.report))
-    jsonschema.validate(found, SCHEMA)
+    found = fakes.checked(made.report)
     read = Page(page(found, made.traces))
     assert {"replay", "residual", "loops", "kinds"} <= set().union(*read.figures.values())
     assert any(label.startswith(f"residual of {channel} over") for label in read.labels)
@@ -121,8 +109,7 @@ def test_missing_channels_are_left_out_of_the_page():
     made.report |= {"closed_loop": None, "isolability": None, "rivals": [], "calibration": []}
     made.report["closed_loop_reason"] = "a controller cannot compensate creep"
     made.report["noise_floor"] = {"contraction": None, "pressure": None}
-    found = json.loads(report_json(made.report))
-    jsonschema.validate(found, SCHEMA)
+    found = fakes.checked(made.report)
     read = Page(page(found, made.traces))
     assert "No controller was compared: a controller cannot compensate creep." in read.text
     assert "Nothing was refitted." in read.text
@@ -131,14 +118,14 @@ def test_missing_channels_are_left_out_of_the_page():
 
 
 def test_without_traces_the_figures_of_the_report_remain():
-    found = json.loads(report_json(fakes.report()))
+    found = fakes.stored(fakes.report())
     assert set(draw(found, None)) == {"structure", "rivals", "kinds", "isolability"}
 
 
 def test_page_without_held_out_data_has_no_close_up():
     made = fakes.diagnosis("named")
     made.traces.held_out[:] = False
-    names = set(draw(json.loads(report_json(made.report)), made.traces))
+    names = set(draw(fakes.stored(made.report), made.traces))
     assert "zoom" not in names
     assert {"replay", "residual"} <= names
 
@@ -158,7 +145,7 @@ def test_settled_readings_are_drawn_by_load():
         "extended_mm": [2.01 * p for p in pressure],
         "effects_mm": {"creep": [0.1 * p for p in pressure]},
     }
-    found = json.loads(report_json(fakes.report()))
+    found = fakes.stored(fakes.report())
     found["readings"] = {
         "ladder": [
             {
@@ -173,7 +160,7 @@ def test_settled_readings_are_drawn_by_load():
         ],
         "curves": curves,
     }
-    jsonschema.validate(found, SCHEMA)
+    jsonschema.validate(found, fakes.SCHEMA)
     read = Page(page(found, None))
     assert read.figures["replay"] == {"replay"}
     assert {"residual", "structure"} <= read.figures["residual"]
@@ -219,7 +206,7 @@ def test_thinned_line_keeps_extremes():
 
 def test_page_of_long_recording_is_small():
     made = fakes.diagnosis("named", rows=30_000, period=0.02)
-    html = page(json.loads(report_json(made.report)), made.traces)
+    html = page(fakes.stored(made.report), made.traces)
     assert len(html.encode()) < 3e6
 
 

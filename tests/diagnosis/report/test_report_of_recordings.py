@@ -1,67 +1,42 @@
 """Reports of real diagnoses: layout, held-out data, provenance, reasons."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
-from pathlib import Path
+from functools import cache
 
 import jsonschema
 import numpy as np
 import pytest
-import yaml
 
-from pam_envs.data.recording.recording import Recording, load_recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import Diagnosis, diagnose
-from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.diagnosis import hidden
+from tests.diagnosis.conftest import needs_kernels, recorded
+from tests.diagnosis.report import report_fakes as fakes
 from tests.diagnosis.report.page_reader import Page
 
-pytestmark = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
-SCHEMA = json.loads(
-    (Path(__file__).parents[2] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
-)
+pytestmark = needs_kernels
 CAUSES = ("leak", "temperature", "creep", "slip_step", "sensor_bias", "dead_time")
 
 
-def made(name: str, size: float, folder: Path) -> tuple[Recording, Rig]:
-    random = np.random.default_rng(8)
-    base, campaign = hidden.draw_base(random), hidden.campaign_short(2)
-    effects = [(hidden.draw_effect(name, random), size)] if size else []
-    hidden.write_csv(
-        hidden.make_recording(base, effects, campaign, noise_seed=4), folder / "recording.csv"
-    )
-    (folder / "rig.yaml").write_text(yaml.safe_dump(hidden.rig_yaml(base, campaign)))
-    rig = Rig.from_yaml(folder / "rig.yaml")
-    return load_recording(folder / "recording.csv", rig), rig
-
-
 @pytest.fixture(scope="module")
-def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Diagnosis]:
+def diagnosed(tmp_path_factory):
     """Return diagnoses by the effect that was hidden, each made once."""
-    known: dict[str, Diagnosis] = {}
 
+    @cache
     def make(name: str) -> Diagnosis:
-        if name not in known:
-            size, folder = 0.0 if name == "none" else 4.0, tmp_path_factory.mktemp(name)
-            recording, rig = made(name, size, folder)
-            known[name] = diagnose(
-                recording, rig=rig, causes=CAUSES, progress=False, closed_loop=False
-            )
-        return known[name]
+        size, folder = 0.0 if name == "none" else 4.0, tmp_path_factory.mktemp(name)
+        recording, rig = recorded(folder, name, size, hidden.campaign_short(2))
+        return diagnose(recording, rig=rig, causes=CAUSES, progress=False, closed_loop=False)
 
     return make
 
 
 @pytest.mark.parametrize("name", ["temperature", "slip_step", "none"])
-def test_real_report_is_valid_and_equals_written_file(
-    diagnosed: Callable[[str], Diagnosis], name: str, tmp_path: Path
-) -> None:
+def test_real_report_is_valid_and_equals_written_file(diagnosed, name, tmp_path):
     found = diagnosed(name)
     assert found.causes == (() if name == "none" else (name,))
-    jsonschema.validate(found.report, SCHEMA)
+    jsonschema.validate(found.report, fakes.SCHEMA)
     found.write(tmp_path)
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == found.report
     read = Page((tmp_path / "report.html").read_text(encoding="utf-8"))
@@ -69,23 +44,18 @@ def test_real_report_is_valid_and_equals_written_file(
     assert SingleMuscle.from_yaml(tmp_path / "plant.yaml").digest() == found.plant.digest()
 
 
-def test_report_states_the_held_out_data(diagnosed: Callable[[str], Diagnosis]) -> None:
+def test_report_states_the_held_out_data(diagnosed):
     kinds, once = diagnosed("temperature"), diagnosed("slip_step")
-    assert kinds.report["held_out"]["by"] == "kinds"
-    assert all(kind in kinds.text for kind in kinds.report["held_out"]["kinds"])
-    assert set(kinds.report["error_before"]["contraction"]["kinds"]) == set(
-        kinds.report["held_out"]["kinds"]
-    )
-    assert kinds.report["held_out"]["share"] == pytest.approx(
-        kinds.traces.held_out.mean(), abs=1e-5
-    )
+    left = kinds.report["held_out"]
+    assert left["by"] == "kinds"
+    assert all(kind in kinds.text for kind in left["kinds"])
+    assert set(kinds.report["error_before"]["contraction"]["kinds"]) == set(left["kinds"])
+    assert left["share"] == pytest.approx(kinds.traces.held_out.mean(), abs=1e-5)
     assert once.report["held_out"] | {"share": 0.0} == {"by": "blocks", "kinds": [], "share": 0.0}
     assert "blocks of 4 s" in once.text
 
 
-def test_gains_equal_held_out_error_ratios(
-    diagnosed: Callable[[str], Diagnosis],
-) -> None:
+def test_gains_equal_held_out_error_ratios(diagnosed):
     report = diagnosed("temperature").report
     before, after = report["error_before"], report["error_after"]
     gain = sum(2.0 * np.log(before[c]["value"] / after[c]["value"]) for c in before)
@@ -96,7 +66,7 @@ def test_gains_equal_held_out_error_ratios(
     assert {name for name, by in on.items() if by == "blocks"} <= {"slip_step"}
 
 
-def test_parameters_have_provenance(diagnosed: Callable[[str], Diagnosis]) -> None:
+def test_parameters_have_provenance(diagnosed):
     found = diagnosed("temperature")
     marks, report = found.plant.provenance, found.report
     source = report["provenance"]["recording"]["digest"][:12]
@@ -107,7 +77,7 @@ def test_parameters_have_provenance(diagnosed: Callable[[str], Diagnosis]) -> No
     assert "published" not in {kind for kind, _ in marks.values()}
 
 
-def test_rig_can_be_traced(diagnosed: Callable[[str], Diagnosis]) -> None:
+def test_rig_can_be_traced(diagnosed):
     report = diagnosed("temperature").report
     assert report["provenance"]["rig"]["source"].endswith("rig.yaml")
     rig = Rig(repeats=(("a", "b"),), tolerance={"mass.load": 0.02})
@@ -115,11 +85,9 @@ def test_rig_can_be_traced(diagnosed: Callable[[str], Diagnosis]) -> None:
     assert len({Rig().digest, rig.digest, Rig(rezeroed=True).digest}) == 3
 
 
-def test_missing_closed_loop_comparison_has_a_reason(
-    diagnosed: Callable[[str], Diagnosis], tmp_path: Path
-) -> None:
+def test_missing_closed_loop_comparison_has_a_reason(diagnosed, tmp_path):
     assert diagnosed("temperature").report["closed_loop_reason"] == "it was not requested"
-    recording, rig = made("slip_step", 4.0, tmp_path)
+    recording, rig = recorded(tmp_path, "slip_step", 4.0, hidden.campaign_short(2))
     found = diagnose(recording, rig=rig, causes=CAUSES, progress=False)
     assert found.report["closed_loop"] is None
     assert "cannot compensate slip_step" in found.report["closed_loop_reason"]

@@ -4,8 +4,6 @@ Its spring, the spread of its friction and the way a load acts are other functio
 the diagnosis fits.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from pam_envs.data.tables import ContractionTable

@@ -1,7 +1,5 @@
 """Diagnosis of settled readings: measured tables, and synthetic ones with known truth."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 

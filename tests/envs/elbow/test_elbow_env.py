@@ -137,7 +137,7 @@ def test_reward_weighs_torque_and_stiffness_as_the_headline() -> None:
 
 def test_torque_and_stiffness_as_actions() -> None:
     env = made(plant=QUIET, action="torque_stiffness", motion="still", normalize=False)
-    held = driven(env, [1.0, 4.0], 60, 3)
+    held = driven(env, [1.0, 4.0], 80, 3)
     assert held["saturated"][-1] == 0.0
     assert held["state/torque"][-1] == pytest.approx(1.0, abs=2e-3)
     assert held["state/stiffness"][-1] == pytest.approx(4.0, abs=2e-3)

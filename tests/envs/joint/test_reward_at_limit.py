@@ -15,9 +15,12 @@ from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 PERIODS = 150
 CASES: dict[str, tuple[Any, dict[str, Any]]] = {
-    "PAM/AntagonisticJoint-v0": (AntagonisticJoint.paper(), {"reference": "mixed"}),
+    "PAM/AntagonisticJoint-v0": (
+        AntagonisticJoint.paper().with_lag_alone(),
+        {"reference": "mixed"},
+    ),
     "PAM/RedundantManipulator-v0": (
-        RedundantManipulator.paper(),
+        RedundantManipulator.paper().with_lag_alone(),
         {"reference": "path_2", "path_seconds": 0.6, "rest_seconds": 0.2},
     ),
 }
@@ -28,7 +31,8 @@ EVERY = pytest.mark.parametrize("name", CASES)
 
 
 def make(name: str) -> Any:
-    return gym.make(name, episode_seconds=0.01 * PERIODS, **CASES[name][1]).unwrapped
+    plant, how = CASES[name]
+    return gym.make(name, plant=plant, episode_seconds=0.01 * PERIODS, **how).unwrapped
 
 
 def rewards(env: Any, held: float | None, seed: int = 0) -> tuple[np.ndarray, list[dict]]:
