@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from baselines.joint.model import JointModel, joint_model
 from benchmarks.papers.joint_studies import DEGREE, RANGE
+from benchmarks.papers.published import as_published
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.joint_forc import (
     JointHysteresis,
@@ -89,6 +91,38 @@ def inverse_error(histories: int = 60) -> tuple[float, float]:
     return worst_exact, worst_series
 
 
+def relay_output(model: Preisach, path: Sequence[int]) -> Array:
+    """Return the outputs of the sum of relays (3.1) after each of a series of grid points.
+
+    A cell's relay is up after an input at or above its upper corner, down after one at or below
+    its lower corner; at the start all are down.
+    """
+    cells = len(model.levels) - 1
+    switch_up, switch_down = np.arange(1, cells + 1)[:, None], np.arange(cells)[None, :]
+    up, outputs = np.zeros((cells, cells), bool), []
+    for point in path:
+        up = (up | (switch_up <= point)) & ~(switch_down >= point)
+        outputs.append(model.start_output + float(np.sum(model.weights[up])))
+    return np.array(outputs)
+
+
+def antisymmetry_error() -> float:
+    """Return the largest error of ``f_ab = -f_ba`` over the range, of symmetric weights.
+
+    ``f_ab`` is the output after a rise to ``a`` and a fall to ``b``, ``f_ba`` that after a fall to
+    ``b`` and a rise to ``a``, both from the nearest saturation and counted from mid-range.
+    """
+    plays = inhomogeneous()
+    middle, inputs = plays.start_output + 0.5 * float(plays.everett[-1, 0]), plays.levels
+    worst = 0.0
+    for a in range(4, len(inputs), 4):
+        for b in range(0, a, 4):
+            down = plays.simulate(inputs[[0, a, b]])[0][-1] - middle
+            risen = plays.simulate(inputs[[0, -1, b, a]])[0][-1] - middle
+            worst = max(worst, abs(float(down + risen)))
+    return worst / float(plays.everett[-1, 0])
+
+
 PRESSURES = (0.5e5, 6.5e5)
 """Range of the single muscle's pressure [Pa]; below, it does not lift its load."""
 
@@ -97,8 +131,8 @@ PRESSURES = (0.5e5, 6.5e5)
 def verdicts() -> dict[str, JointHysteresis]:
     """Return the measured hysteresis of two simulated joints and of one of their muscles."""
     joints = {
-        "paper joint": AntagonisticJoint.paper("maxwell_slip"),
-        "measured joint": AntagonisticJoint.measured("maxwell_slip"),
+        "paper joint": as_published(AntagonisticJoint.paper("maxwell_slip")),
+        "measured joint": as_published(AntagonisticJoint.measured("maxwell_slip")),
     }
     found = {
         name: measure_joint(joint.rest_angles, joint.angle_range[1])

@@ -30,6 +30,7 @@ from baselines.core.catalogue import CONTROLLERS, make_controller
 from baselines.core.entry import Spec
 from baselines.joint.model import POLE
 from baselines.linear.systems import discrete, double_lag
+from benchmarks.papers.published import as_published
 from benchmarks.runs import rollout
 from benchmarks.scoring.group import rms
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
@@ -89,6 +90,7 @@ class ReducedRig:
     """The reduced plant, used as simulated plant and as model of the controllers."""
 
     width: float = 1.0
+    dead_time: float = 0.0
     stages: int = 1
     control_period: float = PERIOD
     angle_range: tuple[float, float] = (-RANGE, RANGE)
@@ -233,7 +235,8 @@ def plant_run(joint: AntagonisticJoint, name: str, size: float) -> Array:
 
 @cache
 def _angles(plant: str, name: str, size: float) -> Array:
-    return plant_run(getattr(AntagonisticJoint, plant)("maxwell_slip"), name, size)
+    joint = as_published(getattr(AntagonisticJoint, plant)("maxwell_slip"))
+    return plant_run(joint, name, size)
 
 
 def plant_step(plant: str, name: str, size: float, turned: bool) -> StepFigures:

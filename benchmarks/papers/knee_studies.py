@@ -19,6 +19,7 @@ import pam_envs  # noqa: F401  registers the ids
 from baselines.core.entry import Spec
 from baselines.knee.feedforward import make_knee_forward
 from baselines.knee.ltr import make_knee_ltr
+from benchmarks.papers.published import as_published
 from benchmarks.runs import rollout
 from benchmarks.scoring.group import rms
 from benchmarks.scoring.groups import knee as metrics_knee
@@ -79,7 +80,9 @@ def tension_errors(
     regulator's lag.
     """
     preset = {"rig": KneeOrthosis.rig, "no_load": KneeOrthosis.no_load}[mounting]
-    plant = preset(dynamics=dynamics, hysteresis__width=width / PRESET_FRICTION).without_noise()
+    wide = width / PRESET_FRICTION
+    plant = preset("maxwell_slip", dynamics=dynamics, hysteresis__width=wide).without_noise()
+    plant = as_published(plant)
     kinds = ("nominal", "line", "inverse")
     printed = feedback == "printed"
     return TensionErrors(
@@ -89,7 +92,7 @@ def tension_errors(
 
 def stiffness_errors() -> tuple[float, float]:
     """Return the errors [%] of inverse and straight line in ``PAM/KneeStiffness-v0``."""
-    plant = KneeOrthosis.rig().without_noise()
+    plant = as_published(KneeOrthosis.rig("maxwell_slip").without_noise())
     inverse, line = (
         _error("Stiffness", plant, make_knee_forward, kind=kind) for kind in ("inverse", "line")
     )
@@ -124,7 +127,7 @@ def stride(
     has a preview of one lag of the regulator, unlike the paper's. ``pace`` is the duration of a
     stride [s]. The keys are those of the environment's ``info``, and ``set_point`` [Pa].
     """
-    plant = KneeOrthosis.on_leg(activity, stride=pace).without_noise()
+    plant = as_published(KneeOrthosis.on_leg(activity, pace, "maxwell_slip").without_noise())
     env: Any = gym.make(
         IDS[activity],
         disable_env_checker=True,

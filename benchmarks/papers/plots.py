@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from baselines.joint.model import joint_model
 from benchmarks.papers.joint_hysteresis import loop_path
 from benchmarks.papers.joint_studies import DEGREE, FINE, HOLD, STEP, step, step_run
+from benchmarks.papers.published import as_published
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 Array = NDArray[np.float64]
@@ -196,7 +197,7 @@ def _label(ax: Any, across: str, up: str, title: str, legend: str) -> None:
 
 
 def _draw_loops(ax: Any) -> None:
-    joint = AntagonisticJoint.paper("maxwell_slip")
+    joint = as_published(AntagonisticJoint.paper("maxwell_slip"))
     model = joint_model(joint)
     for known, label, colour in (
         (model.narrowed(0.0), "straight line", "#009e73"),

@@ -4,23 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeVar
+
+from pam_envs.plants.core.plant import Plant
 
 BEFORE = "not in the paper: computed independently by another program"
 UNKNOWN = float("nan")
 """Printed value of a figure that the paper does not print."""
 NEAR = 0.05
 """Largest difference, over the printed value, of a figure without a tolerance of its own."""
+VERDICTS = ("reproduced", "differs", "not modelled", "not checkable")
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a paper compared with ours, which is ``None`` if it could not be computed.
+    """A value or statement of a paper compared with ours.
 
     ``published`` is the number that the paper prints, and decides where there is one. ``expected``
-    is the result of an independent program from the paper's equations. ``tolerance`` is the largest
-    accepted difference, to either side. ``at_least`` and ``at_most`` are targets of this package. A
-    ``given`` figure is an input, shown but not judged. ``why`` is the reason of a known difference.
+    is the result of an independent program from the paper's own data and equations. ``claim`` are
+    the paper's words where it makes a statement, with ``at_least`` and ``at_most`` as its meaning;
+    without a claim these are targets of this package. ``tolerance`` is the largest accepted
+    difference, to either side. ``source`` is the paper and, after a comma, its places in the
+    inventory, with semicolons between them. A ``given`` figure is an input, shown but not judged.
+    ``why`` is the reason of a known difference. Without ``ours``, ``absent`` is the verdict and
+    ``note`` its reason.
     """
 
     name: str
@@ -35,6 +42,13 @@ class Figure:
     at_least: float | None = None
     given: bool = False
     why: str = ""
+    claim: str = ""
+    absent: str = "not checkable"
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Places of the paper, as the inventory has them."""
+        return tuple(self.source.partition(", ")[2].split("; "))
 
     @property
     def printed(self) -> float | None:
@@ -47,10 +61,12 @@ class Figure:
         if self.ours is None or self.given:
             return None
         checks = list[bool]()
-        if self.tolerance is not None:
-            target = self.expected if self.printed is None else self.printed
-            assert target is not None, f"{self.name}: a tolerance of nothing"
-            checks.append(abs(self.ours - target) <= self.tolerance)
+        value = self.expected if self.printed is None else self.printed
+        if value is not None:
+            band = NEAR * abs(value) if self.tolerance is None else self.tolerance
+            bounded = self.at_least is not None or self.at_most is not None
+            if self.tolerance is not None or not bounded:
+                checks.append(abs(self.ours - value) <= band)
         if self.at_most is not None:
             checks.append(self.ours <= self.at_most)
         if self.at_least is not None:
@@ -68,31 +84,55 @@ class Figure:
         return ", ".join(words)
 
     @property
+    def comparable(self) -> bool:
+        """True if the paper prints or implies something to compare ours with."""
+        known = self.printed is not None or self.expected is not None or bool(self.claim)
+        return known and not self.given
+
+    @property
     def verdict(self) -> str:
-        """Against the paper where it prints a number, else against our target."""
+        """One of ``VERDICTS``."""
         if self.ours is None:
-            return "not computed"
-        if self.given:
-            return "input"
-        if self.printed is not None:
-            near = abs(self.ours - self.printed) <= NEAR * abs(self.printed)
-            good = near if self.passed is None else self.passed
-            return "reproduced" if good else "differs"
-        return {True: "target met", False: "target missed", None: "not printed"}[self.passed]
+            return self.absent
+        if not self.comparable or self.passed is None:
+            return "not checkable"
+        return "reproduced" if self.passed else "differs"
 
     @property
     def remark(self) -> str:
-        """The note, followed by the reason of a miss."""
+        """The reason of the verdict, the note, and the reason of a miss."""
+        first = ""
+        if self.ours is not None and self.verdict == "not checkable":
+            first = "an input, not a result" if self.given else "the paper gives no value"
         reason = self.why if self.passed is False else ""
-        return "; ".join(text for text in (self.note, reason) if text)
+        return "; ".join(text for text in (first, self.note, reason) if text)
+
+    @property
+    def unexplained(self) -> bool:
+        """True if ours misses its target, or has no verdict of agreement, without a reason."""
+        silent = self.passed is False and not self.why
+        return silent or (self.verdict != "reproduced" and not self.remark)
 
     def record(self) -> dict[str, Any]:
         """Return the figure as plain data."""
-        return {**asdict(self), "passed": self.passed}
+        return {**asdict(self), "passed": self.passed, "verdict": self.verdict}
 
 
 Group = Callable[[], Iterable[Figure]]
 """Computes some figures of a paper; its docstring is their title."""
+
+P = TypeVar("P", bound=Plant)
+
+
+def as_published(plant: P) -> P:
+    """Return the plant with regulators that have neither dead time nor limited rate.
+
+    The hysteresis of a plant of this folder is named where the plant is built: ``"maxwell_slip"``,
+    driven by pressure, or none.
+    """
+    if plant.hysteresis.drive != "pressure":  # type: ignore[attr-defined]
+        raise ValueError(f"the hysteresis of this {plant.family} is not driven by pressure")
+    return plant.with_lag_alone()
 
 
 def note(*words: str) -> str:
@@ -115,7 +155,10 @@ def table(figures: Sequence[Figure]) -> str:
         ("figure", "printed", "recomputed", "target", "ours", "unit", "verdict", "where", "reason")
     ]
     for f in figures:
-        known = ["" if value is None else f"{value:.4g}" for value in (f.printed, f.expected)]
-        ours = "-" if f.ours is None else f"{f.ours:.4g}"
-        lines.append((f.name, *known, f.target, ours, f.unit, f.verdict, f.source, f.remark))
+        printed, recomputed, ours = (
+            "" if value is None else f"{value:.4g}" for value in (f.printed, f.expected, f.ours)
+        )
+        printed = printed or (f'"{f.claim}"' if f.claim else "")
+        known = (printed, recomputed, f.target, ours or "-")
+        lines.append((f.name, *known, f.unit, f.verdict, f.source, f.remark))
     return aligned(lines)
