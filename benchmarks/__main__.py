@@ -1,7 +1,5 @@
 """Command line of the benchmarks."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -266,21 +264,28 @@ def tune(
     return 0
 
 
-def papers(json: Path | None = None) -> int:
+def papers(
+    paper: tuple[str, ...] = (), place: tuple[str, ...] = (), json: Path | None = None
+) -> int:
     """Compare printed figures with ours; exit code 1 if one differs without a reason.
 
     Args:
+        paper: Only these papers, for example yeh2010. All by default.
+        place: Only these places, for example 'Eq. (10)' or 'Fig. 7'. All by default.
         json: Also write them to this file.
     """
     from benchmarks.papers.figures import all_figures
+    from benchmarks.papers.inventory import summary
     from benchmarks.papers.published import table
     from benchmarks.runs.store import write_record
 
-    figures = all_figures()
+    figures = all_figures(paper, place)
     print(table(figures))
+    if not paper and not place:
+        print(f"\n{summary(figures)}")
     if json:
         write_record(json, {"figures": [figure.record() for figure in figures]})
-    return 1 if any(figure.passed is False and not figure.why for figure in figures) else 0
+    return 1 if any(figure.unexplained for figure in figures) else 0
 
 
 def effort(seeds: int = 10, wearer: Literal["prescribed", "adaptive"] = "prescribed") -> int:
@@ -401,7 +406,6 @@ def diagnosis(
     loops: int = 0,
     next: bool = False,
     force: bool = False,
-    rejudge: bool = False,
     timed: bool = False,
     cells: Path | None = None,
     out: Path | None = None,
@@ -419,7 +423,6 @@ def diagnosis(
         loops: Cases of every cause that are run in closed loop on the hidden rig.
         next: Carry out the experiments that are proposed.
         force: Compute stored cases again.
-        rejudge: Run nothing; apply the present rule to the records of earlier runs.
         timed: Also time whole reports of ten minutes at 50 Hz on two cores, afterwards.
         cells: Folder of the records, which are the checkpoint.
         out: Folder of the page, its numbers and its figure. By default benchmarks/results for the
@@ -435,12 +438,6 @@ def diagnosis(
     cases = (chosen, offset, fraction, kind, name, limit, loops, next)
     where = (computing.jobs, force, folder, computing.backend, computing.address)
     options = running.Options(*cases, *where)
-    if rejudge:
-        records = running.rejudged(options)
-        print(f"{len(records)} records judged anew")
-        for path in telling.write(records, out or folder / "pages" / "rejudged", "--rejudge"):
-            print(path)
-        return 0
     with progress("cases") as start:
         report = running.run(options, start)
     print(f"{report.computed} computed, {report.found} were there already")

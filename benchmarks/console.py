@@ -1,7 +1,5 @@
 """Console output of runs and of verified rows."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,8 +11,7 @@ from benchmarks.runs.runner import Report
 from benchmarks.runs.verify import Verdict
 from benchmarks.scoring.metrics import shown
 
-LINES = 40
-"""Largest number of listed fields of a row."""
+LINES = 40  # largest number of listed fields of a row
 HOLDS, NEARLY, DRIFTED = "reproduced", "reproduced within tolerance", "DRIFTED"
 
 
@@ -23,8 +20,6 @@ def run(report: Report) -> int:
     print(f"{report.computed} cells computed, {report.found} were there already")
     for name in report.quarantined:
         print(f"corrupt, set aside and computed again: {name}")
-    if report.swept:
-        print(f"{report.swept} half-written files removed")
     for path in report.rows:
         print(_score(path))
     for line in report.missing:

@@ -1,7 +1,5 @@
 """Calibration of the EMG-proxy effort: what assistance could save, and what chance costs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -27,8 +25,7 @@ COLUMNS = (
     "x scatter",
 )
 SECONDS = 20.0
-SETTLED = 2.0
-"""Begin [s] of the episode that is not counted."""
+SETTLED = 2.0  # begin [s] of the episode that is not counted
 VENTED, RANDOM = "zero", "random"
 
 
@@ -80,10 +77,7 @@ TRACKS = ("knee_walk_nominal", "knee_stairs_up_nominal", "knee_stairs_down_nomin
 
 
 def pareto_figure() -> Any:
-    """Return RMS tracking error against effort of the rows of the gaits' nominal tracks.
-
-    Points are means over public episodes; the line joins those that no other dominates.
-    """
+    """Return RMS error against effort of the gaits' nominal tracks, the dominant rows joined."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10.5, 4.0), layout="constrained")

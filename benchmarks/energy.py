@@ -1,7 +1,5 @@
 """Net work of plants on closed cycles of pressure and position, drawn at random."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -10,19 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.board.format import table
+from pam_envs import plants
 from pam_envs.hysteresis.protocol import DRIVES, kind_of
-from pam_envs.plants import (
-    AntagonisticJoint,
-    ElbowOrthosis,
-    KneeOrthosis,
-    RedundantManipulator,
-    SingleMuscle,
-)
 from pam_envs.plants.core.passivity import Cycles, cycle_work
 
 CORNERS = 5
-SMALLEST = 0.01
-"""Smallest size of a cycle, over the range of positions."""
+SMALLEST = 0.01  # smallest size of a cycle, over the range of positions
 
 
 @dataclass(frozen=True)
@@ -52,11 +43,11 @@ class Case:
 
 
 CASES = {
-    "single muscle": Case(SingleMuscle.mas10, 1, 6e5, 0.0, 0.014),
-    "knee orthosis": Case(KneeOrthosis.no_load, 1, 4.5e5, 0.19, 0.25),
-    "antagonistic joint": Case(AntagonisticJoint.paper, 2, 6.5e5, -0.45, 0.45),
-    "redundant manipulator": Case(RedundantManipulator.paper, 2, 6.5e5, -0.45, 0.45),
-    "elbow orthosis": Case(ElbowOrthosis.paper, 2, 4e5, 0.1, 2.0),
+    "single muscle": Case(plants.SingleMuscle.mas10, 1, 6e5, 0.0, 0.014),
+    "knee orthosis": Case(plants.KneeOrthosis.no_load, 1, 4.5e5, 0.19, 0.25),
+    "antagonistic joint": Case(plants.AntagonisticJoint.paper, 2, 6.5e5, -0.45, 0.45),
+    "redundant manipulator": Case(plants.RedundantManipulator.paper, 2, 6.5e5, -0.45, 0.45),
+    "elbow orthosis": Case(plants.ElbowOrthosis.paper, 2, 4e5, 0.1, 2.0),
 }
 
 
@@ -96,7 +87,7 @@ def isobaric_figure() -> Any:
     kinds = ("maxwell_slip_length", "preisach_length", "maxwell_slip")
     titles = ("Maxwell-slip, driven by length", "Preisach, driven by length", "driven by pressure")
     for ax, kind, title in zip(panels, kinds, titles, strict=True):
-        plant = SingleMuscle.mas10(kind, mass__load=0.0)
+        plant = plants.SingleMuscle.mas10(kind, mass__load=0.0)
         for low, high, width in ((0.0, 0.012, 1.4), (0.005, 0.007, 0.8)):
             up = np.linspace(low, high, 121)
             lengths = np.concatenate([up, up[::-1]])

@@ -1,7 +1,5 @@
 """Draw the pictures of the documentation (``make images``)."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

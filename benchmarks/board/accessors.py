@@ -1,7 +1,5 @@
 """Accessors of a row for tables, claims and the site; only this module knows the keys of a row."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,25 +10,22 @@ from benchmarks.runs.cells import AUDIT, PUBLIC
 from benchmarks.runs.rows import Row, episodes_of, scores_of
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import statistics
-from benchmarks.scoring.metrics import headline_of, shown
+from benchmarks.scoring.group import Column
+from benchmarks.scoring.metrics import headline_of, headlines_of, shown
 from benchmarks.scoring.statistics import Array, Interval
 
-LISTED_SEEDS = 5
-"""Training seeds that a learned row needs to be ranked."""
+LISTED_SEEDS = 5  # training seeds that a learned row needs to be ranked
 VERIFIED = "verified"
 """Key of a row's verification, set by :func:`benchmarks.board.leaderboard.load`."""
 
 
 @dataclass(frozen=True)
 class Scores:
-    """One metric of a row: a table with a row a training seed and a column an episode.
-
-    ``strata`` are the scenarios of the columns, ``runs`` the training seeds, both ascending.
-    """
+    """One metric of a row: a row a training seed and a column an episode."""
 
     table: Array
-    strata: list[str]
-    runs: list[int | None]
+    strata: list[str]  # scenarios of the columns, ascending
+    runs: list[int | None]  # training seeds, ascending
 
 
 def name_of(row: Mapping[str, Any]) -> str:
@@ -56,6 +51,11 @@ def env_of(row: Mapping[str, Any]) -> str:
 def unit_of(row: Mapping[str, Any]) -> tuple[str, float]:
     """Return the unit in which the row's headline is shown, and its factor from SI."""
     return shown(content_of(row))
+
+
+def headlines(row: Mapping[str, Any]) -> tuple[Column, ...]:
+    """Return the metrics that are shown beside the row's RMS."""
+    return headlines_of(content_of(row))
 
 
 def is_classical(row: Mapping[str, Any]) -> bool:
@@ -185,10 +185,7 @@ def pairs_of(row: Mapping[str, Any], split: str) -> frozenset[tuple[str, int]]:
 
 
 def common_split(first: Row, second: Row) -> str | None:
-    """Return the split on which two rows are compared, ``None`` if their episodes differ.
-
-    It is the audit if both are in the round, otherwise the public episodes.
-    """
+    """Return the split on which two rows are compared: the audit of both, or the public one."""
     split = AUDIT if is_audited(first) and is_audited(second) else PUBLIC
     same = first["task"] == second["task"] and pairs_of(first, split) == pairs_of(second, split)
     return split if same else None
@@ -196,18 +193,14 @@ def common_split(first: Row, second: Row) -> str | None:
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of tuning and training a controller.
-
-    ``trials`` are settings tried, None if not counted; ``steps`` and ``seconds`` are the mean over
-    the training seeds [1], [s]; ``command`` trains the first seed again.
-    """
+    """Cost of tuning and training a controller."""
 
     tuning: str
-    trials: int | None
-    steps: float | None
-    seconds: float | None
+    trials: int | None  # settings tried, None if not counted
+    steps: float | None  # mean over the training seeds
+    seconds: float | None  # mean over the training seeds [s]
     hardware: str
-    command: str
+    command: str  # trains the first seed again
 
 
 def cost_of(row: Mapping[str, Any]) -> Cost:

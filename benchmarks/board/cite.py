@@ -1,7 +1,5 @@
 """BibTeX of a row: the row itself, this package, and the methods of the controller."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,8 +11,7 @@ from benchmarks.runs.provenance import ROOT
 from benchmarks.runs.store import CHECKSUM
 from pam_envs import citations
 
-SEPARATOR = "; "
-"""Separator between the parts of a citation."""
+SEPARATOR = "; "  # separator between the parts of a citation
 
 Fields = Mapping[str, Any]
 
@@ -27,10 +24,7 @@ def bibtex(row: Mapping[str, Any]) -> str:
 
 
 def methods(citation: str) -> list[str]:
-    """Return the keys of the methods in a citation of keys or titles, in its order.
-
-    A part without an entry in ``references.bib`` raises a ValueError.
-    """
+    """Return the keys of the methods in a citation; ValueError if one has no BibTeX entry."""
     keys = []
     for part in filter(None, citation.split(SEPARATOR)):
         found = [
@@ -54,8 +48,7 @@ def entry(key: str, fields: Fields) -> str:
 
 
 _SPECIAL = str.maketrans({letter: f"\\{letter}" for letter in "&%#_$"})
-_UNBRACED = str.maketrans("", "", "{}\\")
-"""Without the characters that BibTeX interprets."""
+_UNBRACED = str.maketrans("", "", "{}\\")  # without the characters that BibTeX interprets
 
 
 def package() -> str:
@@ -76,8 +69,7 @@ def package() -> str:
     return entry("pam_envs", fields | {name: text for name, text in optional.items() if text})
 
 
-AUTHORS = "The pam-envs authors"
-"""Author of a row whose controller names none."""
+AUTHORS = "The pam-envs authors"  # author of a row whose controller names none
 
 
 def _row_entry(row: Mapping[str, Any]) -> str:

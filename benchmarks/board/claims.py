@@ -1,7 +1,5 @@
 """Claims of a controller against the best paper controller of its track."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,8 +12,7 @@ from benchmarks.runs.rows import Row
 from benchmarks.scoring.metrics import COST_FLOOR, COST_RATIO, COSTS, of_track
 from benchmarks.scoring.statistics import NOTHING, Interval
 
-CLAIM_SEEDS = 10
-"""Training seeds that a claim needs."""
+CLAIM_SEEDS = 10  # training seeds that a claim needs
 PROBABILITY, LOWER_BOUND = 0.95, 0.5
 """Thresholds of the probability of improvement and of its lower 95 % bound."""
 BETTER, DEARER, NOT_SHOWN = "better", "better error, higher cost", "not shown to be better"
@@ -23,23 +20,17 @@ BETTER, DEARER, NOT_SHOWN = "better", "better error, higher cost", "not shown to
 
 @dataclass(frozen=True)
 class Claim:
-    """Comparison of a controller with the best paper controller of its track.
-
-    ``probability`` is the probability of improvement of the headline over training seeds and paired
-    episodes; ``gain`` is the relative reduction of the mean, paired by episode; ``ratios`` are cost
-    ratios, infinite if the paper controller has no such cost; ``reasons`` are the violated
-    conditions of ``BETTER``; ``remarks`` are the numbers of settings tried for each side.
-    """
+    """Comparison of a controller with the best paper controller of its track."""
 
     row: Row
     paper: Row
     split: str
-    probability: Interval
-    ratios: dict[str, float]
+    probability: Interval  # of improvement of the headline, over training seeds and paired episodes
+    ratios: dict[str, float]  # cost ratios, infinite if the paper controller has no such cost
     verdict: str
-    reasons: tuple[str, ...]
-    gain: Interval
-    remarks: tuple[str, ...]
+    reasons: tuple[str, ...]  # violated conditions of BETTER
+    gain: Interval  # relative reduction of the mean, paired by episode
+    remarks: tuple[str, ...]  # numbers of settings tried for each side
 
 
 def is_paper(row: Row) -> bool:
@@ -48,11 +39,7 @@ def is_paper(row: Row) -> bool:
 
 
 def best_paper(rows: Sequence[Row]) -> Row | None:
-    """Return the best paper controller of a track, ``None`` if there is none.
-
-    It has the lowest mean over the episodes of the audit round; if no paper controller is in the
-    round, the lowest mean over the public episodes.
-    """
+    """Return the paper controller with the lowest audit (else public) mean; ``None`` without."""
     return next((row for row in standings.ordered(rows) if is_paper(row)), None)
 
 
@@ -73,10 +60,7 @@ def _ratio(row: Row, paper: Row, metric: str, split: str) -> float:
 
 
 def claim(row: Row, paper: Row, doubts: Sequence[str] = ()) -> Claim | None:
-    """Return the claim of a row, ``None`` if the two have not run the same episodes.
-
-    ``doubts`` are objections to every claim of the track.
-    """
+    """Return the claim of a row; ``None`` if the two have not run the same episodes."""
     split, probability = views.common_split(row, paper), standings.improvement(row, paper)
     if split is None or probability is None:
         return None

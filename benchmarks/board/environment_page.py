@@ -1,7 +1,5 @@
 """Page of one environment: its tracks, rank changes, controllers and their cost."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 
@@ -9,20 +7,9 @@ import numpy as np
 
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, standings
+from benchmarks.board import format as fmt
 from benchmarks.board.cite import methods
 from benchmarks.board.claims import Claim
-from benchmarks.board.format import (
-    Table,
-    bounded,
-    chance,
-    duration,
-    folded,
-    millions,
-    number,
-    percent,
-    signed,
-    tables,
-)
 from benchmarks.board.standings import Changes, Listing, Track
 from benchmarks.board.words import (
     Cells,
@@ -47,10 +34,7 @@ INTRODUCTION = (
 
 
 def page_text(name: str, tracks: Mapping[str, Track], figures: Mapping[str, str]) -> str:
-    """Return the page of an environment; ``figures`` are paths relative to it, by track.
-
-    The nominal track comes first, rows best first.
-    """
+    """Return the page of an environment; ``figures`` are paths relative to it, by track."""
     entries = {views.name_of(row): row for ordered in tracks.values() for row in ordered}
     lines = [f"# {name}", "", INTRODUCTION, ""]
     for change in standings.changes(standings.ranked(tracks)):
@@ -81,7 +65,7 @@ def _rank_changes(found: Changes) -> list[str]:
         for name, (first, *more) in found.places.items()
     ]
     places.append(["*Kendall's tau*", "1", *(f"{tau:.2f}" for tau in found.agreement[1:])])
-    return [*lines, "", *folded("All places", tables(heading, places))]
+    return [*lines, "", *fmt.folded("All places", fmt.tables(heading, places))]
 
 
 def _moved(by: int, place: str) -> str:
@@ -99,16 +83,17 @@ def _track(ordered: Track, figure: str | None) -> list[str]:
     if figure:
         lines += [f"![error, effort and performance profiles]({figure})", ""]
     inside = standings.ordered(listing.inside)
+    unit, factor = views.unit_of(inside[0])
     folds = {
         "Knowledge, preview and verification": _origins(ordered),
         "Public episodes, smooth references and costs": _more_scores(inside, columns),
-        "Every metric": _metrics(inside, columns),
+        "Every metric": by_controller(inside, _means([("", f"RMS [{unit}]", factor), *columns])),
         "Interquartile means, and each row against the one above": _pairs(inside),
     }
     if settings := list(views.by_setting(ordered[0])):
         folds["By setting"] = _settings(inside, settings)
     for title, (heading, cells) in folds.items():
-        lines += folded(title, tables(heading, cells))
+        lines += fmt.folded(title, fmt.tables(heading, cells))
     return lines
 
 
@@ -121,7 +106,7 @@ def _verdicts(ordered: Track, made: Sequence[Claim]) -> list[str]:
     for entry in made:
         lines.append(
             f"- `{views.name_of(entry.row)}`: {full_verdict(entry)}; lower by "
-            f"{percent(entry.gain)}, P(improvement) {chance(entry.probability)}."
+            f"{fmt.percent(entry.gain)}, P(improvement) {fmt.chance(entry.probability)}."
         )
     return [*lines, ""]
 
@@ -139,22 +124,28 @@ def _scores(listing: Listing, made: Sequence[Claim]) -> list[str]:
         if rows:
             unit, split = views.unit_of(rows[0])[0], views.published_split(rows[0])
             columns: Cells = {f"{split} RMS [{unit}] [95 %]": _bold_score}
+            for metric, name, factor in views.headlines(rows[0]):
+                columns[f"{name} [95 %]"] = partial(_bounded, metric, factor)
             if views.is_audited(rows[0]):
                 columns[f"audit - public [{unit}]"] = _gap_words
-            columns[f"P(improvement), {split} episodes"] = lambda row: chance(
+            columns[f"P(improvement), {split} episodes"] = lambda row: fmt.chance(
                 probabilities.get(views.name_of(row))
             )
             columns["failures"] = lambda row: "{} of {}".format(*views.failures_of(row))
             heading, cells = by_controller(rows, columns)
             ranked = zip(places or ["-"] * len(rows), cells, strict=True)
-            table = tables(["rank", *heading], [[place, *line] for place, line in ranked])
+            table = fmt.tables(["rank", *heading], [[place, *line] for place, line in ranked])
             lines += [*([title, ""] if title else []), *table, ""]
     return lines
 
 
 def _bold_score(row: Row) -> str:
-    value, _, bounds = bounded(views.interval(row), views.unit_of(row)[1]).partition(" ")
+    value, _, bounds = fmt.bounded(views.interval(row), views.unit_of(row)[1]).partition(" ")
     return f"**{value}** {bounds}"
+
+
+def _bounded(metric: str, factor: float, row: Row) -> str:
+    return fmt.bounded(views.interval(row, metric), factor)
 
 
 def _gap_words(row: Row) -> str:
@@ -162,13 +153,13 @@ def _gap_words(row: Row) -> str:
 
     A changed artefact is audited again, so that a high number means that earlier gaps were known.
     """
-    words = signed(views.gap(row), views.unit_of(row)[1])
+    words = fmt.signed(views.gap(row), views.unit_of(row)[1])
     marked = f"**{words}**" if views.is_worse_unseen(row) else words
     entry = int(row["audit"]["entry"])
     return f"{marked} (artefact {entry})" if entry > 1 else marked
 
 
-def _origins(rows: Sequence[Row]) -> Table:
+def _origins(rows: Sequence[Row]) -> fmt.Table:
     """Return kind, model knowledge, preview and verification of each row."""
 
     def preview(row: Row) -> str:
@@ -188,29 +179,25 @@ def _means(columns: Sequence[Column]) -> Cells:
     """Return columns with means over the published episodes."""
 
     def mean(metric: str, factor: float, row: Row) -> str:
-        return number(factor * views.mean_of(row, metric))
+        return fmt.number(factor * views.mean_of(row, metric))
 
     return {title: partial(mean, metric, factor) for metric, title, factor in columns}
 
 
-def _more_scores(rows: Sequence[Row], columns: Sequence[Column]) -> Table:
+def _more_scores(rows: Sequence[Row], columns: Sequence[Column]) -> fmt.Table:
     """Return interquartile mean, public score, smooth references and costs of each row."""
     unit, factor = views.unit_of(rows[0])
+    costs = [c for c in columns if c[0] in COSTS and c not in views.headlines(rows[0])]
     cells: Cells = {
-        f"IQM [{unit}]": lambda row: number(factor * views.middle(row).value),
-        f"public RMS [{unit}]": lambda row: number(factor * views.mean_of(row, split=PUBLIC)),
+        f"IQM [{unit}]": lambda row: fmt.number(factor * views.middle(row).value),
+        f"public RMS [{unit}]": lambda row: fmt.number(factor * views.mean_of(row, split=PUBLIC)),
     }
     if any(views.smooth(row) for row in rows):
-        cells[f"smooth references [{unit}]"] = lambda row: bounded(views.smooth(row), factor)
-    return by_controller(rows, {**cells, **_means([c for c in columns if c[0] in COSTS])})
+        cells[f"smooth references [{unit}]"] = lambda row: fmt.bounded(views.smooth(row), factor)
+    return by_controller(rows, {**cells, **_means(costs)})
 
 
-def _metrics(rows: Sequence[Row], columns: Sequence[Column]) -> Table:
-    unit, factor = views.unit_of(rows[0])
-    return by_controller(rows, _means([("", f"RMS [{unit}]", factor), *columns]))
-
-
-def _pairs(rows: Sequence[Row]) -> Table:
+def _pairs(rows: Sequence[Row]) -> fmt.Table:
     """Return interquartile means, and each row's difference to the row above."""
     unit, factor = views.unit_of(rows[0])
     above = dict(zip((row["row"] for row in rows[1:]), rows, strict=False))
@@ -221,21 +208,21 @@ def _pairs(rows: Sequence[Row]) -> Table:
         share = standings.improvement(row, other) if other else None
         if gap is None or share is None:
             return "-", "-"
-        return signed(gap, factor), f"{100.0 * share.value:.0f} %"
+        return fmt.signed(gap, factor), f"{100.0 * share.value:.0f} %"
 
     columns: Cells = {
-        f"IQM of RMS [{unit}] [95 %]": lambda row: bounded(views.middle(row), factor),
+        f"IQM of RMS [{unit}] [95 %]": lambda row: fmt.bounded(views.middle(row), factor),
         f"RMS minus the row above [{unit}] [95 %]": lambda row: compared(row)[0],
         "better than the row above in": lambda row: compared(row)[1],
     }
     return by_controller(rows, columns)
 
 
-def _settings(rows: Sequence[Row], keys: Sequence[tuple[str, str]]) -> Table:
+def _settings(rows: Sequence[Row], keys: Sequence[tuple[str, str]]) -> fmt.Table:
     found = {row["row"]: views.by_setting(row) for row in rows}
 
     def cell(key: tuple[str, str], row: Row) -> str:
-        return number(views.unit_of(row)[1] * found[row["row"]].get(key, float(np.nan)))
+        return fmt.number(views.unit_of(row)[1] * found[row["row"]].get(key, float(np.nan)))
 
     return by_controller(rows, {f"{key[0]} {key[1]}": partial(cell, key) for key in keys})
 
@@ -249,12 +236,12 @@ def _costs(tracks: Mapping[str, Track]) -> list[str]:
         "tuning": lambda row: views.cost_of(row).tuning or "-",
         "trials": lambda row: "-" if (n := views.cost_of(row).trials) is None else str(n),
         "seeds": lambda row: str(views.training_seeds(row) or "-"),
-        "steps a seed": lambda row: millions(views.cost_of(row).steps),
-        "time a seed": lambda row: duration(views.cost_of(row).seconds),
+        "steps a seed": lambda row: fmt.millions(views.cost_of(row).steps),
+        "time a seed": lambda row: fmt.duration(views.cost_of(row).seconds),
         "hardware": lambda row: views.cost_of(row).hardware or "-",
     }
     table = by_controller([entries[name] for name in sorted(entries)], columns)
-    return ["As stated by the author of the row, not verified.", "", *tables(*table)]
+    return ["As stated by the author of the row, not verified.", "", *fmt.tables(*table)]
 
 
 def _controllers(entries: Mapping[str, Row]) -> list[str]:

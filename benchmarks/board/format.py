@@ -1,20 +1,16 @@
 """Formatting of the board's numbers and tables."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
 
 from benchmarks.scoring.statistics import Interval
 
-Table = tuple[list[str], list[list[str]]]
-"""Heading and lines."""
-WIDTH = 150
-"""Largest number of characters of a table's line; a wider table is split."""
+Table = tuple[list[str], list[list[str]]]  # heading and lines
+WIDTH = 150  # largest number of characters of a table's line; a wider table is split
 LEFT = {
     *("controller", "environment", "track", "knows", "verdict", "kind", "state", "episodes"),
-    *("best paper controller", "best learned", "first here", "tuning", "hardware"),
+    *("best paper controller<br>best learned", "first here", "tuning", "hardware"),
 }
 """Columns of words, aligned to the left."""
 

@@ -1,7 +1,5 @@
 """The board's files: a pure function of the rows, with equal bytes for equal rows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,8 +15,7 @@ from benchmarks.runs.rows import Row
 from benchmarks.runs.store import write_all
 
 BOARD = Path(__file__).parents[1] / "LEADERBOARD.md"
-PAGES = "leaderboard"
-"""Folder of the pages beside the board, with the figures and the times."""
+PAGES = "leaderboard"  # folder of the pages beside the board, with the figures and the times
 
 
 def load(folder: Path) -> list[Row]:
@@ -51,10 +48,7 @@ def files(all_rows: Sequence[Row]) -> dict[str, str]:
 
 
 def write(folder: Path = rows.RESULTS, board: Path = BOARD) -> list[Path]:
-    """Write the board, its pages, figures and times; return their paths.
-
-    Pages and figures of an earlier board that are no longer part of it are removed.
-    """
+    """Write the board, its pages, figures and times in place of earlier ones; return paths."""
     texts = files(load(folder))
     named = {board.name if name == BOARD.name else name: text for name, text in texts.items()}
     return write_all(board.parent, named, (f"{PAGES}/*.md", f"{PAGES}/figures/*.svg"))

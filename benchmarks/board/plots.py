@@ -1,7 +1,5 @@
 """Figures of the board. Matplotlib is imported when one is drawn."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Sequence
@@ -20,19 +18,14 @@ _FIXED: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],
     "font.size": 8.0,
 }
-POINTS = 60
-"""Number of errors at which a performance profile is evaluated."""
+POINTS = 60  # number of errors at which a performance profile is evaluated
 MARKS = {"classical": "o", "residual": "D", "learned": "s"}
 DRAWN = 8
 """Number of classical controllers that are drawn, the best of a track, with all learned ones."""
 
 
 def track_figure(ordered: Sequence[Row]) -> str:
-    """Return an SVG of a track, its rows best first: error against effort, performance profiles.
-
-    It shows the rows that are compared with each other, on their common episodes. Equal rows give
-    equal bytes.
-    """
+    """Return an SVG of a track: error against effort, performance profiles; equal bytes."""
     import matplotlib
     from matplotlib.figure import Figure
 

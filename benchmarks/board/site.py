@@ -1,7 +1,5 @@
 """Static site, a pure function of the rows: one folder, without server and network."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -36,10 +34,7 @@ GROUPS = {
 
 
 def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
-    """Write the site from the rows of a folder, in place of an earlier build; return its files.
-
-    ``index.html`` comes first; equal rows give equal bytes.
-    """
+    """Write the site from the rows of a folder; equal rows give equal bytes."""
     all_rows = leaderboard.load(results)
     texts = page(all_rows)
     for row in all_rows:
@@ -95,7 +90,7 @@ def _track(name: str, ordered: Track) -> dict[str, Any]:
     first, listing = ordered[0], standings.listing(ordered)
     content = views.content_of(first)
     unit, factor = views.unit_of(first)
-    columns = columns_of(content)
+    columns, headlines = columns_of(content), views.headlines(first)
     paper = claims.best_paper(ordered)
     return {
         "name": name,
@@ -110,7 +105,8 @@ def _track(name: str, ordered: Track) -> dict[str, Any]:
         "paper": "" if paper is None else views.name_of(paper),
         "figure": f"figures/{name}.svg",
         "columns": [title for _, title, _ in columns],
-        "costs": [k for k, (metric, _, _) in enumerate(columns) if metric in COSTS],
+        "headlines": [title for _, title, _ in headlines],
+        "costs": [k for k, c in enumerate(columns) if c[0] in COSTS and c not in headlines],
         "settings": [f"{axis} {point}" for axis, point in views.by_setting(first)],
         "rows": _rows(listing, columns, claims.learned_claims(ordered)),
     }
@@ -148,6 +144,7 @@ def _row(row: Row, columns: Sequence[Column], against: Claim | None) -> dict[str
         "split": views.published_split(row),
         "preview": rounded(controller["preview_seconds"]),
         "score": _numbers(views.interval(row), factor),
+        "headlines": [_numbers(views.interval(row, m), f) for m, _, f in views.headlines(row)],
         "iqm": _numbers(views.middle(row), factor),
         "public": _numbers(views.interval(row, split=PUBLIC), factor),
         "gap": _numbers(views.gap(row), factor),
@@ -208,9 +205,9 @@ def _winner(found: board_summary.Winner) -> dict[str, Any]:
         "track": found.track,
         "split": found.split,
         "paper": views.name_of(paper) if paper else "none",
-        "paper_score": words.score_words(paper, found.split),
+        "paper_scores": words.scores_by_title(paper, found.split),
         "learned": views.name_of(entry.row) if entry else "none",
-        "learned_score": words.score_words(entry.row if entry else None, found.split),
+        "learned_scores": words.scores_by_title(found.learned, found.split),
         "chance": _numbers(entry.probability) if entry else None,
         "gain": percent(entry.gain) if entry else "-",
         "cost": words.largest_cost(entry) if entry else "-",

@@ -1,7 +1,5 @@
 """Ranks of the rows of a track by paired differences, and rank changes between tracks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -30,17 +28,12 @@ class Place:
 
 @dataclass(frozen=True)
 class Listing:
-    """The rows of a track, the lowest error first.
+    """The rows of a track, the lowest error first."""
 
-    ``ranked`` are in the audit round of the track, or all rows where there is no round yet; ``few``
-    have too few training seeds for a rank. ``outside`` are rows that are not in the round, and
-    ``missing`` the controllers that are in the round and have no row.
-    """
-
-    ranked: Track
-    few: Track
-    outside: Track
-    missing: tuple[str, ...]
+    ranked: Track  # in the audit round of the track, or all rows where there is no round yet
+    few: Track  # too few training seeds for a rank
+    outside: Track  # not in the round
+    missing: tuple[str, ...]  # controllers in the round without a row
 
     @property
     def inside(self) -> Track:
@@ -105,11 +98,7 @@ def listing(rows: Sequence[Row]) -> Listing:
 
 
 def difference(first: Row, second: Row) -> Interval | None:
-    """Return the difference of the headlines of ``first`` and ``second``, paired by episode.
-
-    The episodes are the audit's if both rows have them, otherwise the public ones; ``None`` if the
-    rows have not run the same episodes.
-    """
+    """Return the difference of the headlines, paired by episode; ``None`` for other episodes."""
     return _compared(statistics.difference_of_tables, first, second)
 
 
@@ -148,25 +137,18 @@ def ranks(best_first: Sequence[Row]) -> list[Place]:
 
 @dataclass(frozen=True)
 class Changes:
-    """Ranks of the controllers that have run in all tracks of an environment.
-
-    ``tracks`` has the nominal one first, ``splits`` the split of each one's episodes, ``places``
-    a place a track for each controller in the order of the first track, and ``agreement``
-    Kendall's tau of each track's means with those of the first, 1 for the same order.
-    """
+    """Ranks of the controllers that have run in all tracks of an environment."""
 
     env: str
-    tracks: tuple[str, ...]
-    splits: tuple[str, ...]
+    tracks: tuple[str, ...]  # the nominal one first
+    splits: tuple[str, ...]  # split of each one's episodes
+    # a place a track for each controller, in the order of the first track
     places: Mapping[str, tuple[Place, ...]]
-    agreement: tuple[float, ...]
+    agreement: tuple[float, ...]  # Kendall's tau of each track's means with those of the first
 
 
 def changes(by_track: Mapping[str, Sequence[Row]]) -> list[Changes]:
-    """Return the rank changes between the tracks of each environment with several tracks.
-
-    Rows are the ranked ones, best first, tracks in the order of :func:`tracks`.
-    """
+    """Return the rank changes of each environment with several tracks, from its ranked rows."""
     families: dict[str, list[str]] = {}
     for name, rows in by_track.items():
         if rows:

@@ -1,7 +1,5 @@
 """Summary of the board: learned against paper controllers, rank changes, pages, explanations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +11,12 @@ from benchmarks.board.format import chance, number, percent, tables
 from benchmarks.board.standings import Track
 from benchmarks.board.words import change_cells, full_verdict, largest_cost, score_words, short_env
 from benchmarks.runs.rows import Row
+from benchmarks.scoring.group import Column
 
 Tracks = Mapping[str, Track]
-READING = Path(__file__).with_name("reading.md")
-"""Explanation of the tables."""
+CONTROLLERS = "best paper controller<br>best learned"
+"""Heading of the two names, each cell beside them with a line for each."""
+READING = Path(__file__).with_name("reading.md")  # explanation of the tables
 NO_ROWS = "There are no rows yet: run `python -m benchmarks run`."
 INTRODUCTION = """\
 # Leaderboard
@@ -36,10 +36,14 @@ order.
 
 @dataclass(frozen=True)
 class Winner:
-    """The best paper controller of a track and the learned controller nearest to a claim."""
+    """The best paper controller of a track and the learned controller nearest to a claim.
+
+    ``headlines`` are the metrics beside the RMS of the track.
+    """
 
     env: str
     track: str
+    headlines: tuple[Column, ...]
     paper: Row | None
     claim: Claim | None
 
@@ -49,6 +53,11 @@ class Winner:
         if self.claim is not None:
             return self.claim.split
         return "" if self.paper is None else views.published_split(self.paper)
+
+    @property
+    def learned(self) -> Row | None:
+        """The learned controller of the claim."""
+        return None if self.claim is None else self.claim.row
 
     @property
     def silence(self) -> str:
@@ -65,7 +74,8 @@ def nominal(tracks: Tracks) -> dict[str, Winner]:
     for name, rows in chosen.items():
         made = claims.learned_claims(rows)
         nearest = made[0] if made else None
-        found[name] = Winner(views.env_of(rows[0]), name, claims.best_paper(rows), nearest)
+        about = (views.env_of(rows[0]), name, views.headlines(rows[0]))
+        found[name] = Winner(*about, claims.best_paper(rows), nearest)
     return found
 
 
@@ -84,26 +94,37 @@ def board_text(all_rows: Sequence[Row], pages: Mapping[str, str] | None = None) 
 
 
 def _winners(tracks: Tracks) -> list[str]:
-    """Return the table of the nominal tracks, and a line with intervals and reasons for each."""
-    heading = ["environment", "best paper controller", "best learned", "lower by", "P", "verdict"]
-    found = nominal(tracks).values()
-    return [*tables(heading, [_line(w) for w in found]), "", NOMINAL, "", *map(_detail, found)]
+    """Return tables of the nominal tracks, and a line with intervals and reasons for each.
+
+    Tracks with the same headlines form a table.
+    """
+    found, lines = list(nominal(tracks).values()), list[str]()
+    for headlines in dict.fromkeys(winner.headlines for winner in found):
+        scores = ["RMS", *(title for _, title, _ in headlines)]
+        heading = ["environment", CONTROLLERS, *scores, "lower by", "P", "verdict"]
+        chosen = [winner for winner in found if winner.headlines == headlines]
+        lines += [*tables(heading, [_line(winner) for winner in chosen]), ""]
+    return [*lines, NOMINAL, "", *map(_detail, found)]
 
 
 def _line(found: Winner) -> list[str]:
-    learned, entry = found.claim.row if found.claim else None, found.claim
-    cells = [f"`{short_env(found.env)}`"]
-    for row in (found.paper, learned):
-        if row is None:
-            cells.append("none<br>-")
-        else:
-            unit, factor = views.unit_of(row)
-            score = f"{number(factor * views.mean_of(row, split=found.split))} {unit}"
-            cells.append(f"`{views.name_of(row)}`<br>{score}")
+    entry = found.claim
+    both = [_scores(row, found) for row in (found.paper, found.learned)]
+    cells = [f"`{short_env(found.env)}`", *map("<br>".join, zip(*both, strict=True))]
     if entry is None:
         return [*cells, "-", "-", found.silence]
     bold = f"**{entry.verdict}**" if entry.verdict == claims.BETTER else entry.verdict
     return [*cells, f"{100.0 * entry.gain.value:+.2g} %", f"{entry.probability.value:.2f}", bold]
+
+
+def _scores(row: Row | None, found: Winner) -> list[str]:
+    """Return the name of a controller and its headlines."""
+    if row is None:
+        return ["none", *("-" for _ in ("RMS", *found.headlines))]
+    unit, factor = views.unit_of(row)
+    score = f"{number(factor * views.mean_of(row, split=found.split))} {unit}"
+    more = [number(by * views.mean_of(row, name, found.split)) for name, _, by in found.headlines]
+    return [f"`{views.name_of(row)}`", score, *more]
 
 
 def _detail(found: Winner) -> str:

@@ -1,7 +1,5 @@
 """Common sentences and table cells of the board's pages and the site."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from benchmarks.board import accessors as views
@@ -56,12 +54,21 @@ def round_words(listing: Listing) -> str:
     return words
 
 
-def score_words(row: Row | None, split: str) -> str:
-    """Return the score of a row over the episodes of a split, with its interval and unit."""
+def scores_by_title(row: Row | None, split: str) -> dict[str, str]:
+    """Return RMS and headlines of a row over the episodes of a split, with intervals and unit."""
     if row is None:
-        return "-"
+        return {}
     unit, factor = views.unit_of(row)
-    return f"{bounded(views.interval(row, split=split), factor)} {unit}"
+    scores = {"RMS": f"{bounded(views.interval(row, split=split), factor)} {unit}"}
+    for metric, title, scale in views.headlines(row):
+        scores[title] = bounded(views.interval(row, metric, split), scale)
+    return scores
+
+
+def score_words(row: Row, split: str) -> str:
+    """Return the scores of a row in words, the RMS first and without its name."""
+    (_, score), *more = scores_by_title(row, split).items()
+    return ", ".join([score, *(f"{title} {value}" for title, value in more)])
 
 
 def largest_cost(entry: Claim) -> str:

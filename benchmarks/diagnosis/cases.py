@@ -6,8 +6,6 @@ noise-free clean rig. A case gives a target size, for which the amplitude is sol
 sees only recording and rig file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import combinations
@@ -35,36 +33,28 @@ CAMPAIGNS = {
     "idle": hidden.campaign_idle,
 }
 SETS = {"small": 0, "tune": 1, "final": 2}
-LARGE, WEAK = (1.0, 5.0), (0.1, 1.0)
-"""Ranges of sizes."""
-LOUDER = 3.0
-"""Relative noise of the ``loud`` cases."""
-BRIEF = (30.0, 60.0, 120.0)
-"""Durations of the ``brief`` recordings [s]."""
+LARGE, WEAK = (1.0, 5.0), (0.1, 1.0)  # ranges of sizes
+LOUDER = 3.0  # relative noise of the ``loud`` cases
+BRIEF = (30.0, 60.0, 120.0)  # durations of the ``brief`` recordings [s]
 MOST_AMPLITUDE = 20.0
-NEAR = 0.03
-"""Tolerance of a size, in the logarithm."""
-ROUNDS, DRAWS = 16, 12
-"""Largest numbers of trials of an amplitude, and of rigs."""
+NEAR = 0.03  # tolerance of a size, in the logarithm
+ROUNDS, DRAWS = 16, 12  # largest numbers of trials of an amplitude, and of rigs
 
 
 @dataclass(frozen=True)
 class Case:
-    """Specification of a case; equal cases give equal recordings.
+    """Specification of a case; equal cases give equal recordings."""
 
-    Kind ``loud`` is a single effect under three times the noise with the same absolute size;
-    ``idle`` a clean rig without motion, which cannot be decided; ``brief`` a recording of a clean
-    rig of some ``seconds``, 0 for the whole campaign. ``sizes`` and ``noise`` are over the usual
-    noise.
-    """
-
+    # "loud": a single effect under three times the noise with the same absolute size; "idle": a
+    # clean rig without motion, which cannot be decided; "brief": a recording of a clean rig of some
+    # seconds
     kind: str
     seed: int
     names: tuple[str, ...] = ()
-    sizes: tuple[float, ...] = ()
+    sizes: tuple[float, ...] = ()  # over the usual noise
     campaign: str = "standard"
-    noise: float = 1.0
-    seconds: float = 0.0
+    noise: float = 1.0  # over the usual noise
+    seconds: float = 0.0  # 0 for the whole campaign
 
     def record(self) -> dict[str, Any]:
         """Return the case in plain types."""
@@ -79,17 +69,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Truth:
-    """One hidden effect with its solved amplitude.
-
-    ``size`` and ``raw`` are its size after and before the refit of the base, over the usual noise;
-    ``trace`` its contribution to the outputs beside the other effects [m], [Pa], shape (2, T).
-    """
+    """One hidden effect with its solved amplitude."""
 
     effect: hidden.Effect
     amplitude: float
-    size: float
-    raw: float
-    trace: Array
+    size: float  # after the refit of the base, over the usual noise
+    raw: float  # before it
+    trace: Array  # contribution to the outputs beside the other effects [m], [Pa], shape (2, T)
 
     @property
     def name(self) -> str:
@@ -99,17 +85,13 @@ class Truth:
 
 @dataclass(frozen=True)
 class Ground:
-    """A clean rig under a campaign, and the subspace of the changes that a refit can make.
-
-    ``clean`` are its outputs without effect and noise [m], [Pa], shape (2, T). ``basis`` is an
-    orthonormal basis of the subspace; ``order`` is the order of a flattened trace in it.
-    """
+    """A clean rig under a campaign, and the subspace of the changes that a refit can make."""
 
     base: hidden.Base
     campaign: hidden.Campaign
-    clean: Array
-    basis: Array
-    order: NDArray[np.int64]
+    clean: Array  # outputs without effect and noise [m], [Pa], shape (2, T)
+    basis: Array  # orthonormal basis of the subspace
+    order: NDArray[np.int64]  # of a flattened trace in it
 
     def left(self, trace: Array) -> Array:
         """Return the part of a trace (2, T) [m], [Pa] that a refit does not absorb, over noise."""

@@ -19,10 +19,8 @@ from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
 from tests.diagnosis.hidden import EFFECTS
 
 VERDICTS = ("named", "ambiguous", "adequate", "unexplained", "insufficient", "failed")
-BINS = ((0.1, 0.3), (0.3, 1.0), (1.0, 2.0), (2.0, 5.0))
-"""Bins of sizes of the tables."""
-CURVE = (0.1, 0.2, 0.35, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0)
-"""Edges of the detection curve."""
+BINS = ((0.1, 0.3), (0.3, 1.0), (1.0, 2.0), (2.0, 5.0))  # bins of sizes of the tables
+CURVE = (0.1, 0.2, 0.35, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0)  # edges of the detection curve
 HELD_OUT = 1.1
 WITHOUT_CAUSE = {
     **dict.fromkeys(("clean", "decoy", "brief"), "adequate"),

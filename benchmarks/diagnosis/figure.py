@@ -1,7 +1,5 @@
 """Figure of the diagnosis benchmark: confusion matrix and detection curve."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from typing import Any

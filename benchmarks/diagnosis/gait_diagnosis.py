@@ -8,9 +8,6 @@ the decision rule of the muscle diagnosis.
 ``python -m benchmarks.diagnosis.gait_diagnosis`` prints the results at several paces.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +17,6 @@ from numpy.typing import NDArray
 from benchmarks.diagnosis.gait_recording import GaitRecording, record
 from benchmarks.diagnosis.plain_plant import Parameters, PlainPlant, plain_causes
 from pam_envs.constants import GRAVITY
-from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.structure import Regressors
 from pam_envs.diagnosis.decide.verdict import Decision, decide
@@ -190,12 +186,7 @@ def blocks_of(recording: GaitRecording) -> Blocks:
     return Blocks(recording.stride, np.arange(n) % EVERY == EVERY - 1, counts)
 
 
-def diagnose(
-    recording: GaitRecording,
-    causes: Sequence[Cause] = CAUSES,
-    rule: Rule | None = None,
-    seed: int = 0,
-) -> Outcome:
+def diagnose(recording: GaitRecording) -> Outcome:
     """Compare Eq. 1 with the laboratory's knee torque and search for missing terms."""
     family, measured = GaitEstimate(recording), recording.torque[None]
     blocks = blocks_of(recording)
@@ -203,8 +194,7 @@ def diagnose(
     noise = np.array([white_noise(recording.torque - plain, recording.stride)])
     problem = Problem(family.simulate, measured, noise, blocks.train, recording.time)
     base = fit_base(problem, blocks, family.column, family.base())
-    made = (rule or Rule(), seed)
-    decision = decide(problem, family, blocks, base, causes, family.regressors(), *made)
+    decision = decide(problem, family, blocks, base, CAUSES, family.regressors(), Rule())
     return Outcome(recording, problem, blocks, base, decision)
 
 

@@ -19,39 +19,27 @@ from pam_envs.plants.knee_orthosis.rollout import simulate_knee
 Array = NDArray[np.float64]
 
 PERIOD = KneeOrthosis.control_period
-PACE_SPREAD = 0.06
-"""Largest relative deviation of a stride's duration from the mean."""
-AIM = (0.9, 1.15)
-"""Range of the height [m] of the point through which the ground force acts."""
-LAB_NOISE = 1.0
-"""Standard deviation of the laboratory's knee torque [N m]."""
-PLATE_NOISE = 2.0
-"""Standard deviation of the plate's horizontal force [N]."""
-LOADED = 50.0
-"""Least vertical force [N] of a loaded foot."""
+PACE_SPREAD = 0.06  # largest relative deviation of a stride's duration from the mean
+AIM = (0.9, 1.15)  # range of the height [m] of the point through which the ground force acts
+LAB_NOISE = 1.0  # standard deviation of the laboratory's knee torque [N m]
+PLATE_NOISE = 2.0  # standard deviation of the plate's horizontal force [N]
+LOADED = 50.0  # least vertical force [N] of a loaded foot
 
 
 @dataclass(frozen=True)
 class GaitRecording:
-    """Strides one after the other, arrays of shape (T,) in SI.
-
-    ``torque`` is the knee torque by inverse dynamics [N m], NaN in swing; ``inertial`` the torque
-    that accelerates shank and foot, from the markers; ``horizontal`` the ground force on the plate
-    [N], forward positive. The orthosis reads ``vertical`` force [N], centre of
-    pressure ``cop`` [m ahead of the ankle] and ``lean`` of the shank [rad]. Knee and ankle angles
-    [rad] are flexion and dorsiflexion.
-    """
+    """Strides one after the other, arrays of shape (T,) in SI."""
 
     stride: NDArray[np.int64]
-    torque: Array
-    vertical: Array
-    cop: Array
-    lean: Array
-    horizontal: Array
-    knee: Array
+    torque: Array  # knee torque by inverse dynamics [N m], NaN in swing
+    vertical: Array  # force read by the orthosis [N]
+    cop: Array  # centre of pressure read by the orthosis [m ahead of the ankle]
+    lean: Array  # of the shank, read by the orthosis [rad]
+    horizontal: Array  # ground force on the plate [N], forward positive
+    knee: Array  # flexion [rad]
     knee_rate: Array
-    ankle: Array
-    inertial: Array
+    ankle: Array  # dorsiflexion [rad]
+    inertial: Array  # torque that accelerates shank and foot, from the markers
     leg: Leg
 
     @property
@@ -73,10 +61,7 @@ class GaitRecording:
 
 
 def record(pace: float, strides: int, seed: int = 0, noise: float = 1.0) -> GaitRecording:
-    """Return strides of level walking with a mean duration [s].
-
-    ``noise`` scales the noise of the sensors.
-    """
+    """Return strides of level walking with a mean duration [s]; ``noise`` is a factor."""
     rng = np.random.default_rng(seed)
     times = pace * (1.0 + PACE_SPREAD * rng.uniform(-1.0, 1.0, strides))
     aims = rng.uniform(*AIM, strides)

@@ -1,7 +1,5 @@
 """Tables and lists in Markdown for the pages of the diagnosis."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

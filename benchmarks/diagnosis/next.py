@@ -1,7 +1,5 @@
 """Experiments and controllers on a hidden rig after its diagnosis."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -23,10 +21,8 @@ from tests.diagnosis.hidden.rig import steps_in
 
 Array = NDArray[np.float64]
 
-FULL = 6.0
-"""Largest pressure [bar] of the rigs."""
-FRESH = ("cycles_after_rest",)
-"""Plans with a rested muscle, for which the rig is reset."""
+FULL = 6.0  # largest pressure [bar] of the rigs
+FRESH = ("cycles_after_rest",)  # plans with a rested muscle, for which the rig is reset
 
 
 def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:

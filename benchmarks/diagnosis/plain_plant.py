@@ -1,7 +1,5 @@
 """Plants other than the muscle for the diagnosis, defined by tables of parameters and causes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -16,7 +14,7 @@ Parameters = Mapping[str, tuple[float, float, float, float]]
 
 
 class PlainPlant:
-    """Parameters of a plant for :class:`pam_envs.diagnosis.fit.plant_protocol.PlantFamily`.
+    """Parameters of a plant for :class:`pam_envs.diagnosis.fit.least_squares.PlantFamily`.
 
     ``base_names`` are always fitted; those of ``weighed`` are known to one meaningful change, those
     of ``logarithmic`` are fitted on a logarithmic scale.

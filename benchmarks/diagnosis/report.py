@@ -1,7 +1,5 @@
 """Page, statistics and figure of the diagnosis benchmark, from its records."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,7 +9,8 @@ from benchmarks.diagnosis import counts as counting
 from benchmarks.diagnosis.counts import BINS, GAP, HELD_OUT, VERDICTS, Answer, Numbers, share
 from benchmarks.diagnosis.figure import picture
 from benchmarks.diagnosis.markdown import bullets, table
-from benchmarks.runs.store import write_bytes, write_record, write_text
+from benchmarks.runs.store import write_record, write_text
+from sweeps.files import write_bytes
 from tests.diagnosis.hidden import EFFECTS
 
 LETTERS = dict(zip(VERDICTS, "NAOUIF", strict=True))
@@ -20,27 +19,7 @@ CASES, CLEAN = 40, 300
 """Least numbers of cases of every cause at sizes above 1, and of rigs without a cause."""
 SECONDS, POST_HOC_MM = 10.0, 0.23
 
-PREFACE = """\
-# Diagnosis of rigs that hide an effect
-
-Made by `python -m benchmarks diagnosis {arguments}`; do not edit. {cases} drawn cases, decision
-rule {rules}.
-
-Each case is a simulated rig that shares no code with the plants and hides effects in another
-mathematical form than the diagnosis fits. The diagnosis sees its recording (five minutes at 50 Hz)
-and a correct rig file.
-
-- The **size** of an effect is the RMS of its part that a refit of the base to the rig without noise
-  does not absorb, over the noise, on the output where it is largest. Sizes are drawn log-uniformly,
-  equally for every cause: from 1 to 5 (*single*) and from 0.1 to 1 (*weak*).
-- A cause counts as **named** if the verdict is `named`, or `ambiguous` with this cause first.
-  **Unambiguous** is `named` with exactly the hidden causes. A **wrong name** is the verdict `named`
-  with an absent cause, alone or beside the correct one.
-- The trace of a found effect and the true one are compared after the same projection: without the
-  part that a refit of the base absorbs. Closed-loop errors are those of the true position; the
-  causes that a controller can compensate are fixed beforehand.
-- A failed run counts as wrong. Intervals are exact (Clopper-Pearson) at 95 %, bounds one-sided.
-"""
+PREFACE = Path(__file__).with_suffix(".md")
 
 
 def figures(
@@ -48,11 +27,7 @@ def figures(
     tables: Mapping[str, Any] | None = None,
     whole_report_s: Sequence[float] = (),
 ) -> Numbers:
-    """Return all statistics of the page from the records of :func:`benchmarks.diagnosis.run.run`.
-
-    ``tables`` is the report of :func:`pam_envs.diagnosis.static.diagnosis.diagnose_readings` on the
-    measured tables; ``whole_report_s`` are durations [s] of whole reports on 10 minutes at 50 Hz.
-    """
+    """Return all statistics of the page from the records, the tables report and durations [s]."""
     answers = [Answer.of(record) for record in records]
     kinds = defaultdict[str, list[Answer]](list)
     for one in answers:
@@ -189,7 +164,7 @@ def page(made: Numbers, arguments: str) -> str:
     head = ["figure", "target", "reached", "n", ""]
     rows = [(*row[:4], words[row[4]]) for row in targets(made)]
     parts = [
-        PREFACE.format(
+        PREFACE.read_text(encoding="utf-8").format(
             arguments=arguments,
             cases=sum(made["cases"].values()),
             rules=", ".join(made["rule_versions"]) or "-",

@@ -4,8 +4,6 @@ A record belongs to a case, a stage and the numbers of rule, causes and default 
 computed again for another version of the rule. A failed case also has a record and counts as wrong.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -23,7 +21,7 @@ from benchmarks.runs import provenance
 from benchmarks.runs.store import Store, read_record
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.decide.rule import Rule, judge
+from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.fit.single_muscle import start_plant
 from sweeps import engine
 
@@ -60,21 +58,16 @@ class Task:
 
 @dataclass(frozen=True)
 class Options:
-    """Selection of cases to run.
-
-    ``fraction`` is that of the cases of every kind and cause; ``kinds`` and ``names`` select kinds
-    and hidden effects; ``loops`` is the number of cases of every cause that are run in closed loop;
-    ``next`` carries out the proposed experiments.
-    """
+    """Selection of cases to run."""
 
     chosen: str = "small"
     offset: int = 0
-    fraction: float = 1.0
+    fraction: float = 1.0  # of the cases of every kind and cause
     kinds: tuple[str, ...] = ()
-    names: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()  # of hidden effects
     limit: int | None = None
-    loops: int = 0
-    next: bool = False
+    loops: int = 0  # number of cases of every cause that are run in closed loop
+    next: bool = False  # carry out the proposed experiments
     jobs: int = 1
     force: bool = False
     folder: Path = FOLDER
@@ -105,25 +98,20 @@ class Options:
 
 @dataclass
 class Report:
-    """Outcome of a run: one record per case, with the sections of its further stages.
+    """Outcome of a run."""
 
-    ``computed`` and ``found`` count the stages computed now and those already stored; ``failed``
-    maps failed cases, which count as wrong, to the reason; ``quarantined`` are corrupt records that
-    were set aside and computed again.
-    """
-
+    # one per case, with the sections of its further stages
     records: list[dict[str, Any]] = field(default_factory=list)
-    computed: int = 0
-    found: int = 0
+    computed: int = 0  # stages computed now
+    found: int = 0  # stages already stored
+    # failed cases, which count as wrong, with the reason
     failed: list[str] = field(default_factory=list)
+    # corrupt records that were set aside and computed again
     quarantined: list[str] = field(default_factory=list)
 
 
 def select(options: Options) -> list[Case]:
-    """Return the cases to run, kinds and causes mixed, so that a partial run is representative.
-
-    A smaller fraction is contained in a larger one.
-    """
+    """Return the cases to run, kinds and causes mixed; a larger fraction contains a smaller."""
     if not 0.0 < options.fraction <= 1.0:
         raise ValueError(f"fraction {options.fraction} is outside (0, 1]; give a part, like 0.1")
     drawn = cases(options.chosen, options.offset)
@@ -165,13 +153,8 @@ def run(
     start: Callable[[int], Advance] = lambda total: lambda: None,
     act: Study = study,
 ) -> Report:
-    """Compute the missing records and return all records.
-
-    ``start`` is called with the number of missing cases of each stage and returns the function to
-    call after each case; ``act`` computes the record of a case and some stages.
-    """
+    """Compute the missing records by ``act``, and return all; ``start`` returns a callback."""
     store = Store(options.folder)
-    store.sweep()
     chosen, report, before = select(options), Report(), set(store.quarantined())
     made = _stage("verdict", chosen, store, options, report, start, act)
     further = {
@@ -182,7 +165,7 @@ def run(
         for case, record in _stage(stage, some, store, options, report, start, act).items():
             failed = record["failure"]
             made[case][stage] = {"failure": failed} if failed else record.get(stage)
-    report.records = sorted(made.values(), key=_place)
+    report.records = sorted(made.values(), key=lambda r: (r["case"]["seed"], r["case"]["kind"]))
     report.failed = [
         f"{Case(**_tuples(record['case'])).title}: {record['failure']}"
         for record in report.records
@@ -190,44 +173,6 @@ def run(
     ]
     report.quarantined = sorted(set(store.quarantined()) - before)
     return report
-
-
-def rejudged(options: Options) -> list[dict[str, Any]]:
-    """Return the stored records, of any version of the sources, judged again by the present rule.
-
-    The newest of several records of a case counts; records with outdated names are omitted.
-    """
-    newest: dict[Case, dict[str, Any]] = {}
-    for path in sorted(options.folder.glob("*.json")):
-        record = read_record(path)
-        case = Case(**_tuples(record["case"]))
-        if record["stage"] == "verdict" and _date(record) >= _date(newest.get(case, {})):
-            newest[case] = record
-    chosen = select(options)
-    return sorted((_judged(newest[case]) for case in chosen if case in newest), key=_place)
-
-
-def _date(record: dict[str, Any]) -> str:
-    return str(record.get("volatile", {}).get("date", ""))
-
-
-def _judged(record: dict[str, Any]) -> dict[str, Any]:
-    """Return a record with the verdict of the present rule on its evidence."""
-    if record["failure"] or not record["evidence"]:
-        return record
-    found = judge(record["evidence"], Rule())
-    rivals = record["evidence"]["levels"][found.level]["rivals"]
-    names = rivals[0]["names"] if found.level else []
-    if set(names) == set(record["names"]):
-        names = record["names"]
-    else:
-        record = {**record, "traces": {}, "held_out": {}, "experiment": None}
-    still = ["+".join(rivals[k]["names"]) for k in found.open_rivals]
-    return {**record, "verdict": found.verdict, "names": names, "open": still}
-
-
-def _place(record: dict[str, Any]) -> tuple[Any, ...]:
-    return record["case"]["seed"], record["case"]["kind"]
 
 
 def _tuples(case: dict[str, Any]) -> dict[str, Any]:

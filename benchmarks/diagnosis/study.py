@@ -1,7 +1,5 @@
 """Study of one benchmark case: diagnosis, ground truth, closed loop, next experiment."""
 
-from __future__ import annotations
-
 import time as clock
 from collections.abc import Collection
 from typing import Any
@@ -25,11 +23,7 @@ MOST_RIVALS = 6
 
 
 def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
-    """Generate a case, diagnose it, and return the result with the ground truth in plain types.
-
-    ``stages`` are some of :data:`STAGES`, ``verdict`` always included; the text of an error is kept
-    as ``failure``.
-    """
+    """Generate a case and diagnose it; return result, truth and ``failure`` as plain types."""
     unknown = sorted(set(stages) - set(STAGES))
     if unknown:
         raise ValueError(f"no stage is called {unknown[0]!r}; there are {', '.join(STAGES)}")
@@ -141,11 +135,7 @@ def trace_errors(made: Made, found: Diagnosis) -> dict[str, dict[str, Any]]:
 
 
 def loop_of(made: Made, found: Diagnosis) -> dict[str, Any] | None:
-    """Return the closed-loop comparison on the hidden rig, with true position errors [mm].
-
-    The load is the median, the temperature the last of the recording. Wrong verdicts are compared
-    too.
-    """
+    """Return the closed-loop comparison on the hidden rig, of wrong verdicts too, errors [mm]."""
     load = float(np.median(made.recording.load))
     celsius = float(made.ground.campaign.temperature_C[-1])
     loop = closed_loop(

@@ -3,8 +3,6 @@
 ``python -m benchmarks.diagnosis.tables`` prints the page; ``--write`` also writes it to ``docs``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,67 +11,15 @@ import tyro
 
 from benchmarks.diagnosis.markdown import bullets, table
 
+TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[2] / "docs" / "diagnosis_tables.md"
-INTRODUCTION = """\
-# Diagnosis of the measured tables
-
-Made by `python -m benchmarks.diagnosis.tables --write`.
-
-Besides recordings the diagnosis accepts tables of settled readings: load, pressure, direction,
-repeat and contraction, without time. The shipped table contains 375 readings of a MAS-10-N-100
-(three loads, 25 pressures up and down, five repeats).
-`pam_envs.diagnosis.static.diagnosis.diagnose_readings(table)` accepts any such table: other loads
-and pressures, one or more repeats, paths with several reversals.
-
-The base is load-blind: a spring with a stiff start and a hardening end behind play operators on
-the pressure (nine parameters). Causes are added to it one at a time and in pairs.
-"""
-METHOD = """\
-## How to read this
-
-- **cells**: root mean square error on the mean readings to which the model was fitted (72 cells,
-  without readings that are zero by definition). **held-out repeat**: error on the readings of a
-  repeat, fitted to the others; the noise floor is the difference of a repeat from the mean of the
-  others. **held-out load**: fitted to the other loads, averaged over the loads.
-- **p**: the larger p-value of a block test with four neighbouring cells as one block, since model
-  errors of neighbours are dependent, and of the F test. It is of one form; the rule multiplies it
-  by the number of forms of the stage.
-- **Rule** (`readings-1`): the search continues while the residual is larger than repeats explain.
-  A form is accepted if its p, times the number of forms, is at most 0.05, if it reduces the mean
-  squared error on held-out repeats by at least 5 %, and if it does not increase the error on
-  held-out loads by more than 2 %. Of several forms of a cause that cannot be separated the first
-  of the catalogue is named. Accepted causes are tested again beside later ones.
-- **Intervals** are 95 % confidence intervals: of parameters from 200 refits to residuals with
-  random signs of blocks of four cells, of errors and gains from resampled blocks. The interval of
-  a gain is wide because a few cells (5.5 bar) have much of the error; acceptance is based on p and
-  the margin.
-- **Load laws**: a linear law was fixed beforehand. An exponent or a dead zone is fitted to the load
-  on which it is judged, unless the table has five loads or more: then it is refitted without each
-  load, and held out.
-- With one load, causes of the load are not testable. With one repeat the noise floor is unknown,
-  and errors are of every sixth cell held out.
-"""
-LIMITS = """\
-## Limits
-
-- The pressure shift as read and the shift with each load's rest length as zero fit equally well,
-  with different values per kilogram: the stretch of the muscle by a load alone was not measured.
-- The margins of the rule (5 %, four cells) were set with knowledge of this table, on synthetic
-  tables without effects; there is no second measured table to judge them. The order of the causes
-  and the shift do not depend on them.
-- Pressure-dependent friction is the weakest of the three causes: its interval is wide, and it
-  hardly improves a held-out load.
-- Residual creep, fitted last, is close to the margin but predicts held-out loads worse.
-"""
 
 
 def main(write: bool = False) -> str:
     """Diagnose the measured tables and print the page.
 
-    Parameters
-    ----------
-    write : bool
-        Also write it to ``docs/diagnosis_tables.md``.
+    Args:
+        write: Also write it to ``docs/diagnosis_tables.md``.
     """
     from pam_envs.data.tables import load_contraction_table
     from pam_envs.diagnosis.static.diagnosis import audit_polynomials, diagnose_readings
@@ -97,19 +43,16 @@ def published() -> dict[str, tuple[float, bool, Sequence[float]]]:
 
 def page(report: dict[str, Any], curves: dict[str, Any]) -> str:
     """Return the page of a report and of the published curves."""
-    parts = [
-        INTRODUCTION,
-        f"**Verdict: {report['verdict']}.** {report['text']}\n",
-        *["## Models\n", ladder(report)],
-        *["## Causes\n", causes(report)],
-        *["## Masked causes\n", hidden(report)],
-        *["## Load law\n", laws(report)],
-        *["## Warnings\n", bullets(report["warnings"])],
-        *["## The published polynomials\n", polynomials(curves)],
-        METHOD,
-        LIMITS,
-    ]
-    return "\n".join(parts)
+    return TEMPLATE.read_text(encoding="utf-8").format(
+        verdict=report["verdict"],
+        text=report["text"],
+        ladder=ladder(report),
+        causes=causes(report),
+        hidden=hidden(report),
+        laws=laws(report),
+        warnings=bullets(report["warnings"]),
+        polynomials=polynomials(curves),
+    )
 
 
 def _errors(rung: dict[str, Any]) -> list[str]:

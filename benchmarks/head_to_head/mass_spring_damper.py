@@ -4,8 +4,6 @@
 With the causes below it is diagnosed like a muscle, from one output instead of two.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,17 +17,12 @@ from pam_envs.diagnosis.fit.starting_values import grid
 
 Array = NDArray[np.float64]
 
-SUBSTEPS = 4
-"""Simulation steps between two readings."""
+SUBSTEPS = 4  # simulation steps between two readings
 NEWTON = 12
-STRETCH = 0.05
-"""Reference displacement of nonlinear springs [m]."""
-STRONG = 5.0
-"""Reference force of a nonlinear actuator [N]."""
-BROKEN_AWAY = 0.001
-"""Stribeck speed [m/s] (canudas1995)."""
-CREEPING = 2e-4
-"""Speed over which friction is regularised [m/s]."""
+STRETCH = 0.05  # reference displacement of nonlinear springs [m]
+STRONG = 5.0  # reference force of a nonlinear actuator [N]
+BROKEN_AWAY = 0.001  # Stribeck speed [m/s] (canudas1995)
+CREEPING = 2e-4  # speed over which friction is regularised [m/s]
 FORCES = (0.1, 0.16, 0.27, 0.43, 0.7, 1.14, 1.85, 3.0)
 """Grid of starting values of the dry friction [N]."""
 PARAMETERS: Parameters = {
@@ -54,14 +47,11 @@ PARAMETERS: Parameters = {
 
 @dataclass(frozen=True)
 class MassSpringDamper(PlainPlant):
-    """Mass-spring-damper under the force [N] of a recording, held from each reading to the next.
+    """Mass-spring-damper under the force of a recording."""
 
-    ``period`` is the sampling period [s]; ``start`` overrides neutral starting values.
-    """
-
-    force: Array
-    period: float
-    start: dict[str, float]
+    force: Array  # [N], held from each reading to the next
+    period: float  # sampling period [s]
+    start: dict[str, float]  # overrides neutral starting values
 
     channels = ("position",)
     units = ("mm",)

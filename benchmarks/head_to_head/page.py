@@ -1,9 +1,8 @@
 """Page of the head-to-head benchmark, from its rows."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,71 +13,24 @@ from benchmarks.diagnosis.markdown import table
 Row = dict[str, Any]
 
 LOSS = "friction.force"
-
-INTRODUCTION = """\
-# Head to head: a hidden dry friction, and `mujoco.sysid`
-
-Made by `python -m benchmarks.head_to_head.run --write` (MuJoCo from the extra `mujoco`).
-
-A known force acts on a mass-spring-damper for 60 s; the position is read at 100 Hz with 1 mm of
-noise. The rig may have an undeclared dry friction of 0.5, 1 or 2 N, under forces of up to 9 N. Both
-tools use the same recordings.
-
-- **ours**: mass, stiffness and damping are refitted; eleven rival causes are compared; the verdict
-  is that of `pam_envs.diagnosis`, with the rule and thresholds of the muscle diagnosis.
-- **mujoco.sysid**: `optimize` fits mass, stiffness and damping, from the same start within the same
-  bounds. *Issues* are the warnings of its own report (`AutomatedInsights`).
-- **mujoco.sysid with friction**: the same with MuJoCo's `frictionloss` as a further parameter, as a
-  user who suspects friction would do; on fewer rigs, since it takes longest.
-
-`mujoco.sysid` estimates the parameters of a given model. It does not test for missing effects; this
-page measures what its report shows if a model lacks one.
-"""
-RIG = """\
-## The rigs
-
-Mass, stiffness and damping are drawn within a factor of 1.25 of 1 kg, 100 N/m and 2 N s/m. Friction
-is a set-valued Coulomb law with a breakaway force 1 to 1.3 times the sliding force (drawn); between
-two events the motion is computed in closed form, and events are found by bisection
-(`benchmarks/head_to_head/rig.py`). The candidate is a smooth tanh law, with or without a breakaway
-force that decays with speed, in a midpoint rule of 2.5 ms
-(`benchmarks/head_to_head/mass_spring_damper.py`); MuJoCo uses RK4 at 5 ms. *Another experiment* is
-a chirp and small steps that are not used in any fit; errors on it are relative to the noise-free
-rig. Causes and starting values were set on rigs of other seeds.
-"""
-ENGINE = """\
-## A second plant
-
-`MassSpringDamper` uses the engine without a change to it. It provides `column`, `simulate`, `free`,
-`base`, a `Regressors`, and a tuple of `Cause`; calibration is `fit.candidate.fit_base`, the
-decision `decide.verdict.decide`. Specific to the muscle are the command line, the reading of
-recordings, the noise floor and the report; here the noise is the sensor's declared 1 mm.
-"""
+TEMPLATE = Path(__file__).with_suffix(".md")
+MISSING = "**`mujoco.sysid` was not installed: its side was not run.**\n\n"
 
 
 def page(result: Row) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    result : dict
-        From :func:`benchmarks.head_to_head.run.main`.
-    """
+    """Return the page of a result of :func:`benchmarks.head_to_head.run.main`."""
     rows = result["rows"]
     against = any("sysid" in row for row in rows)
     packages = ", ".join(f"{k} {v}" for k, v in sorted(result["packages"].items()) if v)
-    parts = [
-        INTRODUCTION,
-        "" if against else "**`mujoco.sysid` was not installed: its side was not run.**\n",
-        *["## Detection\n", noticed(rows, against)],
-        *["## Parameters\n", parameters(rows, against)],
-        *["## Another experiment\n", transfer(rows, against)],
-        *["## Other hidden effects\n", others(rows, against)],
-        RIG,
-        ENGINE,
-        f"Rule {result['rule']}; {packages}.\n",
-    ]
-    return "\n".join(part for part in parts if part)
+    return TEMPLATE.read_text(encoding="utf-8").format(
+        missing="" if against else MISSING,
+        noticed=noticed(rows, against),
+        parameters=parameters(rows, against),
+        transfer=transfer(rows, against),
+        others=others(rows, against),
+        rule=result["rule"],
+        packages=packages,
+    )
 
 
 def rate(hits: Sequence[bool]) -> str:

@@ -14,40 +14,29 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-PERIOD = 0.01
-"""Sampling period [s]."""
-NOISE = 1e-3
-"""Standard deviation of the position sensor's noise [m]."""
+PERIOD = 0.01  # sampling period [s]
+NOISE = 1e-3  # standard deviation of the position sensor's noise [m]
 NOMINAL = {"mass": 1.0, "stiffness": 100.0, "damping": 2.0}
 """Median constants of rigs [kg], [N/m], [N s/m]."""
-SPREAD = 1.25
-"""Largest factor between constants of a rig and the median."""
-BREAKAWAY = (1.0, 1.3)
-"""Range of the breakaway force over the sliding force."""
-LOOK = 1e-3
-"""Interval of the checks for a change of the velocity's sign [s]."""
+SPREAD = 1.25  # largest factor between constants of a rig and the median
+BREAKAWAY = (1.0, 1.3)  # range of the breakaway force over the sliding force
+LOOK = 1e-3  # interval of the checks for a change of the velocity's sign [s]
 HALVINGS = 50
-SETTLED = 2.0
-"""Time without force at the start of an experiment [s]."""
+SETTLED = 2.0  # time without force at the start of an experiment [s]
 
 
 @dataclass(frozen=True)
 class Oscillator:
-    """Constants of a rig in SI.
-
-    ``friction`` is the sliding friction [N], ``breakaway`` the ratio of static to sliding friction,
-    ``delay`` the delay of the force [samples], ``bias`` the sensor's bias [m], ``drift`` its drift
-    over an experiment [m].
-    """
+    """Constants of a rig in SI."""
 
     mass: float = NOMINAL["mass"]
     stiffness: float = NOMINAL["stiffness"]
     damping: float = NOMINAL["damping"]
-    friction: float = 0.0
-    breakaway: float = 1.0
-    delay: int = 0
-    bias: float = 0.0
-    drift: float = 0.0
+    friction: float = 0.0  # sliding friction [N]
+    breakaway: float = 1.0  # ratio of static to sliding friction
+    delay: int = 0  # of the force [samples]
+    bias: float = 0.0  # of the sensor [m]
+    drift: float = 0.0  # of the sensor over an experiment [m]
 
     @classmethod
     def drawn(cls, seed: int, **hidden: float) -> Oscillator:

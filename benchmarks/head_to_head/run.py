@@ -5,8 +5,6 @@ tables; ``--write`` also writes ``docs/head_to_head.md`` and ``results/head_to_h
 the extra ``mujoco`` only our diagnosis is run.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections.abc import Iterator
@@ -34,27 +32,24 @@ Array = NDArray[np.float64]
 HERE = Path(__file__).parents[1]
 RESULTS = HERE / "results" / "head_to_head.json"
 PAGE = HERE.parent / "docs" / "head_to_head.md"
-FRICTIONS = (0.0, 0.5, 1.0, 2.0)
-"""Hidden dry friction [N]."""
+FRICTIONS = (0.0, 0.5, 1.0, 2.0)  # hidden dry friction [N]
 OTHERS: dict[str, dict[str, float]] = {
     "dead_time": {"delay": 3},
     "sensor_bias": {"bias": 0.003},
     "sensor_drift": {"drift": 0.006},
 }
 """Other hidden effects, to test against a bias towards friction."""
-FIRST = 1000
-"""Seed of the first rig; causes and starting values were set on smaller seeds."""
-START = {"mass": 1.5, "stiffness": 70.0, "damping": 3.0}
-"""Starting values of every fit."""
+FIRST = 1000  # seed of the first rig; causes and starting values were set on smaller seeds
+START = {"mass": 1.5, "stiffness": 70.0, "damping": 3.0}  # starting values of every fit
 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A drawn rig: name of the hidden cause (empty without one), and the hidden constants."""
+    """A drawn rig."""
 
     seed: int
-    effect: str
-    hidden: dict[str, float]
+    effect: str  # name of the hidden cause, empty without one
+    hidden: dict[str, float]  # hidden constants
 
     @property
     def rig(self) -> Oscillator:
@@ -82,22 +77,18 @@ class Outcome:
         return family.simulate(column_of(candidate.fit, candidate.fit.z)[None])[0, :, 0]
 
 
-def cases(rigs: int, others: int, first: int = FIRST) -> Iterator[Case]:
+def cases(rigs: int, others: int) -> Iterator[Case]:
     """Yield the cases: ``rigs`` for every friction, ``others`` for every other effect."""
-    for seed in range(first, first + rigs):
+    for seed in range(FIRST, FIRST + rigs):
         for friction in FRICTIONS:
             yield Case(seed, "dry_friction" if friction else "", {"friction": friction})
-    for seed in range(first, first + others):
+    for seed in range(FIRST, FIRST + others):
         for effect, hidden in OTHERS.items():
             yield Case(seed, effect, hidden)
 
 
-def diagnose(force: Array, reading: Array, rule: Rule | None = None, seed: int = 0) -> Outcome:
-    """Diagnose the error of a mass-spring-damper on a recording.
-
-    The force [N] is held from each position reading [m] to the next, both of shape (T,); ``seed``
-    is that of the bootstrap.
-    """
+def diagnose(force: Array, reading: Array) -> Outcome:
+    """Diagnose a mass-spring-damper from held forces [N] and position readings [m], (T,)."""
     family = MassSpringDamper(force, PERIOD, START)
     time: Array = np.asarray(np.arange(len(force)) * PERIOD, np.float64)
     measured = reading[None]
@@ -106,15 +97,12 @@ def diagnose(force: Array, reading: Array, rule: Rule | None = None, seed: int =
     base = fit_base(problem, blocks, family.column, family.base())
     position = family.simulate(column_of(base.fit, base.fit.z)[None])[0, :, 0]
     regressors = family.regressors(position)
-    decision = decide(problem, family, blocks, base, CAUSES, regressors, rule or Rule(), seed)
+    decision = decide(problem, family, blocks, base, CAUSES, regressors, Rule())
     return Outcome(family, problem, blocks, base, decision)
 
 
 def run(case: Case, against: bool, friction: bool = False) -> dict[str, Any]:
-    """Return the results of both tools on a case, in plain types.
-
-    MuJoCo runs if ``against`` is true, and then also fits dry friction if ``friction`` is true.
-    """
+    """Return the results of our tool on a case, and of MuJoCo (``against``), in plain types."""
     rig, force, fresh = case.rig, campaign(case.seed), another(case.seed)
     reading, truth = rig.readings(force, case.seed), rig.positions(fresh)
     row = {**dataclasses.asdict(case), "rig": dataclasses.asdict(rig)}
@@ -158,43 +146,26 @@ def written() -> dict[str, Any]:
     return dict(json.loads(RESULTS.read_text(encoding="utf-8")))
 
 
-def kept(row: dict[str, Any]) -> dict[str, Any]:
-    """Return a row with MuJoCo's stored result of the same case."""
-    alike = ("seed", "effect", "hidden")
-    for old in written()["rows"]:
-        if all(old[key] == row[key] for key in alike):
-            return {**row, **{key: value for key, value in old.items() if key.startswith("sysid")}}
-    raise ValueError(f"{RESULTS.name} has no row of seed {row['seed']}, {row['hidden']}: run both")
-
-
 def main(
-    rigs: int = 20, others: int = 10, friction: int = 5, write: bool = False, keep: bool = False
+    rigs: int = 20, others: int = 10, friction: int = 5, write: bool = False
 ) -> dict[str, Any]:
     """Run both tools on the same recordings and print the tables.
 
-    Parameters
-    ----------
-    rigs : int
-        Drawn rigs for every friction.
-    others : int
-        Drawn rigs for every other hidden effect.
-    friction : int
-        Rigs on which MuJoCo also fits friction, which takes most of its time.
-    write : bool
-        Also write ``results/head_to_head.json`` and ``docs/head_to_head.md``.
-    keep : bool
-        Use MuJoCo's stored results and run only ours: minutes instead of half an hour.
+    Args:
+        rigs: Drawn rigs for every friction.
+        others: Drawn rigs for every other hidden effect.
+        friction: Rigs on which MuJoCo also fits friction, which takes most of its time.
+        write: Also write ``results/head_to_head.json`` and ``docs/head_to_head.md``.
     """
     from rich.progress import track
 
-    version = written()["packages"]["mujoco"] if keep else theirs.version()
+    version = theirs.version()
     if version is None:
         print("mujoco.sysid is not installed (pip install -e .[mujoco]): ours alone is run")
-    rows = []
-    for case in track(list(cases(rigs, others)), "head to head"):
-        against = version is not None and not keep
-        row = plain(run(case, against, case.seed < FIRST + friction))
-        rows.append(kept(row) if keep else row)
+    rows = [
+        plain(run(case, version is not None, case.seed < FIRST + friction))
+        for case in track(list(cases(rigs, others)), "head to head")
+    ]
     result = {
         "schema": 1,
         "rule": Rule().version,

@@ -4,12 +4,11 @@ It is given the mechanism, the force, and our bounds and starting values. Issues
 its own report.
 """
 
-from __future__ import annotations
-
 import importlib.metadata
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,39 +18,19 @@ from benchmarks.head_to_head.mass_spring_damper import PARAMETERS
 
 Array = NDArray[np.float64]
 
-STEP = 0.005
-"""Step of MuJoCo's simulation [s]."""
-MECHANISM = """
-<mujoco>
-  <option timestep="{step}" integrator="RK4" gravity="0 0 0">
-    <flag contact="disable"/>
-  </option>
-  <worldbody>
-    <body name="mass">
-      <inertial pos="0 0 0" mass="1" diaginertia="0.001 0.001 0.001"/>
-      <joint name="slide" type="slide" axis="1 0 0" stiffness="100" damping="2"/>
-    </body>
-  </worldbody>
-  <actuator><motor name="push" joint="slide"/></actuator>
-  <sensor><jointpos name="position" joint="slide"/></sensor>
-</mujoco>
-"""
-LOSS = ("friction.force", 0.5)
-"""Our name of MuJoCo's dry friction, and its starting value [N]."""
+STEP = 0.005  # step of MuJoCo's simulation [s]
+MECHANISM = Path(__file__).with_name("mechanism.xml")
+LOSS = ("friction.force", 0.5)  # our name of MuJoCo's dry friction, and its starting value [N]
 
 
 @dataclass(frozen=True)
 class Identified:
-    """Result of an identification; parameters by our names [SI].
-
-    ``intervals`` are half-widths of 95 % intervals, ``issues`` the warnings of its report;
-    ``position`` is that of the fitted model [m], shape (T,), NaN where it is not compared.
-    """
+    """Result of an identification; parameters by our names [SI]."""
 
     values: dict[str, float]
-    intervals: dict[str, float]
-    issues: list[str]
-    position: Array
+    intervals: dict[str, float]  # half-widths of 95 % intervals
+    issues: list[str]  # warnings of its report
+    position: Array  # of the fitted model [m], shape (T,), NaN where it is not compared
 
 
 def version() -> str | None:
@@ -68,16 +47,12 @@ def version() -> str | None:
 def identify(
     force: Array, reading: Array, period: float, start: dict[str, float], friction: bool
 ) -> Identified:
-    """Fit mass, stiffness and damping, and optionally MuJoCo's dry friction.
-
-    Positions [m] are read every ``period`` [s]; the force [N] is held from each reading to the
-    next.
-    """
+    """Fit mass, stiffness and damping, and optionally dry friction, to positions [m]."""
     import mujoco
     from mujoco import sysid
     from mujoco.sysid.report.sections.insights import AutomatedInsights
 
-    spec = mujoco.MjSpec.from_string(MECHANISM.format(step=STEP))
+    spec = mujoco.MjSpec.from_string(MECHANISM.read_text(encoding="utf-8").format(step=STEP))
     parameters = _parameters(start | ({LOSS[0]: LOSS[1]} if friction else {}))
     sequence = _sequence(spec, force, reading, period)
     residual = sysid.build_residual_fn(models_sequences=[sequence], n_threads=1)
@@ -140,7 +115,7 @@ def predict(values: dict[str, float], force: Array, period: float) -> Array:
     """Return the positions [m], shape (T,), of a model with given parameters under a force."""
     import mujoco
 
-    spec = mujoco.MjSpec.from_string(MECHANISM.format(step=STEP))
+    spec = mujoco.MjSpec.from_string(MECHANISM.read_text(encoding="utf-8").format(step=STEP))
     for parameter in _parameters(values).values():
         parameter.apply_modifier(spec)
     model = spec.compile()

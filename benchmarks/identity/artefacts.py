@@ -1,7 +1,5 @@
 """Identity of a controller: policy files, knobs, and actions for the observations of a task."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,15 +16,13 @@ from benchmarks.scenarios.scenario import ScenarioSet
 
 @dataclass(frozen=True)
 class Artefact:
-    """Behaviour of a controller in a track.
+    """Behaviour of a controller in a track."""
 
-    ``files`` has name, sha256, bytes and training_seed of each policy file. ``answers``, each of
-    shape (n, n_actions), are the controller's actions in each setting of the task, in action
-    ranges: for a residual policy those of the controller that it corrects, for a policy alone none.
-    """
-
+    # name, sha256, bytes and training_seed of each policy file
     files: tuple[Mapping[str, Any], ...]
     knobs: Mapping[str, float]
+    # actions in each setting of the task, (n, n_actions) in action ranges: for a residual policy
+    # those of the controller that it corrects, for a policy alone none
     answers: tuple[behaviour.Array, ...]
 
     def record(self) -> dict[str, Any]:

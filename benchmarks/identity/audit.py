@@ -10,8 +10,6 @@ after them. Rounds are only added to ``rounds.json``; a controller or task that 
 last round is self-reported until the next one.
 """
 
-from __future__ import annotations
-
 import datetime
 import hashlib
 import json
@@ -34,28 +32,23 @@ from benchmarks.runs.store import write_text
 from benchmarks.scenarios.scenario import ScenarioSet
 
 FILE = Path(__file__).resolve().parents[1] / "rounds.json"
-EPISODES = 30
-"""Smallest number of audit episodes of a row."""
+EPISODES = 30  # smallest number of audit episodes of a row
 PER_SCENARIO = 2
 """Smallest number of audit episodes per scenario: an interval needs the scatter within one."""
 
 
 @dataclass(frozen=True)
 class Round:
-    """One salt for all controllers of a track: the seeds are derived from ``frozen`` and ``salt``.
-
-    ``task`` and ``entrants`` are the frozen identities of the task and of each controller,
-    ``frozen`` their digest; rounds are numbered from 1 in each track; the commit is a note.
-    """
+    """One salt for all controllers of a track, from which the seeds are derived."""
 
     track: str
-    number: int
-    task: Mapping[str, Any]
-    entrants: Mapping[str, Mapping[str, Any]]
-    frozen: str
+    number: int  # from 1 in each track
+    task: Mapping[str, Any]  # frozen identity of the task
+    entrants: Mapping[str, Mapping[str, Any]]  # frozen identity of each controller
+    frozen: str  # digest of the frozen identities
     salt: str
     drawn: str
-    commit: str
+    commit: str  # a note
 
     def seeds(self, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
         """Return the audit seeds of each of a track's scenarios."""
@@ -79,14 +72,11 @@ class Round:
 
 @dataclass(frozen=True)
 class Audit:
-    """Place of a controller in the last round of a track: its artefact there and its seeds.
-
-    ``entry`` counts the different artefacts of the controller's name in the track's rounds.
-    """
+    """Place of a controller in the last round of a track."""
 
     round: Round
-    artefact: str
-    entry: int
+    artefact: str  # its artefact there
+    entry: int  # number of different artefacts of the controller's name in the track's rounds
     seeds: Mapping[str, tuple[int, ...]]
 
     def record(self) -> dict[str, Any]:

@@ -5,8 +5,6 @@ processor, so that the hash of a trajectory is portable. The design of a control
 iterations that round differently; its actions are compared within a tolerance.
 """
 
-from __future__ import annotations
-
 import base64
 import zlib
 from collections.abc import Mapping
@@ -22,10 +20,8 @@ from benchmarks.runs import rollout
 from benchmarks.scoring.metrics import scores_of
 
 SEED = 1
-HOLD = 25
-"""Control periods for which an action is held."""
-SHARE = 0.6
-"""Largest action in half ranges: no scenario of the board ends early under it."""
+HOLD = 25  # control periods for which an action is held
+SHARE = 0.6  # largest action in half ranges: no scenario of the board ends early under it
 LEVELS = 5
 PERIODS = 12
 """Number of observations, from the start of each part of a trajectory, given to controllers."""
@@ -34,10 +30,8 @@ SCALES = (1.0, 0.25, 1.0, 0.25)
 
 With small errors fewer actions are saturated, where they would carry no information.
 """
-TOLERANCE = 1e-6
-"""Largest difference of two actions, in action ranges, that counts as rounding."""
-DIGITS = 10
-"""Significant digits of a score; sums of numpy may differ beyond them."""
+TOLERANCE = 1e-6  # largest difference of two actions, in action ranges, that counts as rounding
+DIGITS = 10  # significant digits of a score; sums of numpy may differ beyond them
 
 Array = NDArray[np.float32]
 Sequences = tuple[Array, ...]
@@ -68,16 +62,12 @@ class FixedActions:
 
 @dataclass(frozen=True)
 class Behaviour:
-    """Behaviour of a scenario under fixed actions.
+    """Behaviour of a scenario under fixed actions."""
 
-    ``trajectory`` is the hash of observations and physical signals, without reward terms;
-    ``scores`` are the metrics of that episode, and of the same episode as a failed one, to ten
-    digits; ``observations`` are consecutive ones from the start of each part.
-    """
-
-    trajectory: str
+    trajectory: str  # hash of observations and physical signals, without reward terms
+    # metrics of that episode, and of the same one as a failed one, to ten digits
     scores: Mapping[str, str]
-    observations: Sequences
+    observations: Sequences  # consecutive ones from the start of each part
 
 
 def of_environment(env: Any, content: Mapping[str, Any], rests: bool) -> Behaviour:
@@ -101,10 +91,7 @@ def _sequences(observations: Any) -> Sequences:
 
 
 def of_controller(controller: Any, observations: Sequences, space: Any) -> Array:
-    """Return actions in action ranges, (n, n_actions), with an episode start in each part.
-
-    There are fewer rows if the controller raises an error.
-    """
+    """Return actions (n, n_actions) in action ranges; fewer rows where the controller fails."""
     span = space.high - space.low
     found = []
     for sequence in observations:

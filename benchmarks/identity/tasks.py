@@ -1,7 +1,5 @@
 """Identity of a task: scenarios, parameters of plants and models, trajectories and scores."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
@@ -17,27 +15,22 @@ from benchmarks.scenarios.scenario_env import make_env, model_of
 
 @dataclass(frozen=True)
 class Setting:
-    """Nominal plant and named signals from which the controllers of a track are built.
-
-    Their actions for ``observations``, each of shape (n, n_signals), identify them.
-    """
+    """Nominal plant and named signals from which the controllers of a track are built."""
 
     model: Any
     env: Any
+    # each of shape (n, n_signals); the actions for them identify controllers
     observations: behaviour.Sequences
 
 
 @dataclass(frozen=True)
 class Identity:
-    """Digests by scenario: of the plant's and the model's parameters, trajectory and scores.
+    """Digests of a task, by scenario."""
 
-    The trajectory is that of fixed actions; ``scenarios`` is the digest of the file's content.
-    """
-
-    scenarios: str
-    plants: Mapping[str, str]
-    models: Mapping[str, str]
-    trajectories: Mapping[str, str]
+    scenarios: str  # of the file's content
+    plants: Mapping[str, str]  # of the parameters
+    models: Mapping[str, str]  # of the parameters
+    trajectories: Mapping[str, str]  # under fixed actions
     scores: Mapping[str, str]
 
     @cached_property

@@ -4,8 +4,6 @@ Several seeds show the scatter of a training. A copied policy, a seed dropped be
 or a lucky seed of other settings would hide part of that scatter.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 from collections.abc import Mapping, Sequence

@@ -4,8 +4,6 @@ The cells of one policy in one scenario form a group, whose episodes are the row
 record of a cell does not depend on its group.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -25,25 +23,20 @@ from benchmarks.scoring.metrics import scores_of
 
 SCHEMA = 3
 PUBLIC, AUDIT = "public", "audit"
-PROBED_STEPS = 250
-"""Number of steps of the episode that measures the use of the preview."""
+PROBED_STEPS = 250  # number of steps of the episode that measures the use of the preview
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One controller in one scenario.
-
-    ``training_seed`` chooses the policy of a learned controller; where ``probe`` is true the use of
-    the preview is measured.
-    """
+    """One controller in one scenario."""
 
     entrant: Entrant
     track: ScenarioSet
     scenario: Scenario
-    training_seed: int | None = None
+    training_seed: int | None = None  # chooses the policy of a learned controller
     split: str = PUBLIC
     seeds: tuple[int, ...] = ()
-    probe: bool = False
+    probe: bool = False  # whether the use of the preview is measured
 
     @property
     def key(self) -> str:
@@ -78,10 +71,7 @@ class Cell:
 
 
 def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -> list[Cell]:
-    """Return the cells of a row, public ones first, by training seed and scenario.
-
-    An audit adds its episodes.
-    """
+    """Return the cells of a row by training seed and scenario, public ones first, then audit."""
     scenarios, public = track.scenarios(), track.seeds
     probed = next((s.name for s in scenarios if not s.rests), scenarios[0].name)
     runs = [(seed, s) for seed in entrant.training_seeds for s in scenarios]

@@ -1,7 +1,5 @@
 """Controllers of the catalogues of ``baselines`` and, if installed, of ``agents``."""
 
-from __future__ import annotations
-
 import importlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,30 +25,24 @@ BY_RULE = "by rule or as published"
 
 @dataclass(frozen=True)
 class Entrant:
-    """A controller of the board.
-
-    ``knowledge`` is "nothing", "tables", "nominal model" or "true model"; ``kind`` "classical",
-    "learned" or "residual", which is learned on top of a classical one. ``source`` is the module
-    whose ``make_controller`` builds it. Without ``envs`` it runs in any. ``files`` are training
-    seed and policy file, relative to the checkout, ascending. ``trials`` is the number of settings
-    tried to choose its numbers, None if unknown; ``knobs`` are the numbers that a search found, and
-    ``tuned`` their name in ``baselines/core/tuned.yaml``. ``trained_with`` names the signals and
-    actions of a policy's training. An empty ``author`` means those of this package.
-    """
+    """A controller of the board."""
 
     name: str
-    source: str
+    source: str  # module whose make_controller builds it
+    # "classical", "learned" or "residual", which is learned on top of a classical one
     kind: str = "classical"
     summary: str = ""
-    knowledge: str = "nothing"
+    knowledge: str = "nothing"  # "nothing", "tables", "nominal model" or "true model"
     citation: str = ""
-    envs: tuple[str, ...] = ()
+    envs: tuple[str, ...] = ()  # none for any
+    # training seed and policy file, relative to the checkout, ascending
     files: tuple[tuple[int, Path], ...] = ()
-    trials: int | None = 0
+    trials: int | None = 0  # number of settings tried to choose its numbers, None if unknown
     tuning: str = BY_RULE
-    author: str = ""
-    tuned: str = ""
-    knobs: tuple[tuple[str, float], ...] = ()
+    author: str = ""  # empty for those of this package
+    tuned: str = ""  # name of the knobs in baselines/core/tuned.yaml
+    knobs: tuple[tuple[str, float], ...] = ()  # numbers that a search found
+    # names of the signals and actions of a policy's training
     trained_with: tuple[tuple[str, ...], tuple[str, ...]] | None = None
 
     @property

@@ -1,7 +1,5 @@
 """Model knowledge of a controller in a track: of the true plant, or of a nominal one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

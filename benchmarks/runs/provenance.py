@@ -1,7 +1,5 @@
 """Provenance of a result: packages, commit, processor, place and time."""
 
-from __future__ import annotations
-
 import datetime
 import platform
 import socket
@@ -9,7 +7,8 @@ import subprocess
 from functools import lru_cache
 from pathlib import Path
 
-from benchmarks.identity.hashing import SOURCES, digest, sources_digest
+from benchmarks.identity.hashing import digest
+from sweeps.files import SOURCES, sources_digest
 from sweeps.versions import versions_of
 
 HERE = Path(__file__).resolve().parents[1]

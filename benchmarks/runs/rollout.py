@@ -1,7 +1,5 @@
 """Episodes, recorded as physical signals from ``info``: one, or several as rows of a batch."""
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,11 +13,9 @@ from numpy.typing import NDArray
 from benchmarks.runs.controllers import ROOT, Controller
 from sweeps.worker import is_needed
 
-LONGEST = 300
-"""Largest number of characters of a message in a row."""
+LONGEST = 300  # largest number of characters of a message in a row
 
-REPLAYED = 100
-"""Steps of an episode that are repeated with a single row after a run in a batch."""
+REPLAYED = 100  # steps of an episode that are repeated with a single row after a run in a batch
 
 Array = NDArray[np.float64]
 Watch = Callable[[Any], None]
@@ -27,20 +23,17 @@ Watch = Callable[[Any], None]
 
 @dataclass(frozen=True)
 class Episode:
-    """Record of one episode of n steps.
+    """Record of one episode of n steps."""
 
-    ``signals`` are every entry of ``info``, SI, and the outputs of the model that the controller
-    follows, if it has one: ``model/0``, ``model/1``, ... ``seconds`` are computation times of
-    single actions, not of all steps if episodes ran as rows of a batch. ``failure`` is the reason
-    of an early end, or the message of the controller's error; empty otherwise.
-    """
-
+    # every entry of info, SI, and the outputs of the model that the controller follows, if it has
+    # one: model/0, model/1, ...
     signals: Mapping[str, Array]
     observations: NDArray[Any]
     actions: NDArray[Any]
+    # computation times of single actions; not of all steps if episodes ran as rows of a batch
     seconds: Array
     period: float
-    failure: str
+    failure: str  # reason of an early end, or message of the controller's error; empty otherwise
 
     @property
     def failed(self) -> bool:

@@ -1,7 +1,5 @@
 """Rows of the board: one controller over one scenario file, with all data to reproduce it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -31,8 +29,7 @@ _NAME = re.compile(r"[A-Za-z0-9_]+")
 
 Row = dict[str, Any]
 Record = Mapping[str, Any]
-SUFFIX = ".json.xz"
-"""Of a row's file."""
+SUFFIX = ".json.xz"  # of a row's file
 
 
 def row_name(track: str, controller: str) -> str:
@@ -209,11 +206,8 @@ def command(name: str) -> str:
 def load_all(folder: Path = RESULTS) -> list[Row]:
     """Return all rows of a folder by name.
 
-    Raises
-    ------
-    ValueError
-        If one is damaged, of an environment version that is not here, or of another task than
-        the other rows of its track.
+    A ValueError says that one is damaged, of an environment version that is not here, or of another
+    task than the other rows of its track.
     """
     found = [load(path) for path in files(folder)]
     for row in found:

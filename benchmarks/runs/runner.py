@@ -1,7 +1,5 @@
 """Parallel computation of missing cells and writing of rows; cells on disk are the checkpoint."""
 
-from __future__ import annotations
-
 import importlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -15,7 +13,7 @@ from benchmarks.runs import cells as cells_module
 from benchmarks.runs import rows
 from benchmarks.runs.cells import Cell, cells_of
 from benchmarks.runs.controllers import Entrant
-from benchmarks.runs.store import Store, sweep
+from benchmarks.runs.store import Store
 from benchmarks.scenarios.scenario import ScenarioSet
 from sweeps import engine
 
@@ -27,12 +25,12 @@ Pair = tuple[Entrant, ScenarioSet]
 
 @dataclass(frozen=True)
 class Plan:
-    """Row to write: its cells by key, and its audit if the controller is in the last round."""
+    """Row to write."""
 
     entrant: Entrant
     track: ScenarioSet
-    found: Audit | None
-    cells: dict[str, Cell]
+    found: Audit | None  # audit if the controller is in the last round
+    cells: dict[str, Cell]  # by key
 
 
 def plans(pairs: Iterable[Pair]) -> list[Plan]:
@@ -47,18 +45,14 @@ def plans(pairs: Iterable[Pair]) -> list[Plan]:
 
 @dataclass
 class Report:
-    """Report of a run: cells computed now, and cells already stored.
+    """Report of a run."""
 
-    ``swept`` counts removed half-written files of killed processes; ``quarantined`` names corrupt
-    cells that were computed again; ``missing`` names cells and rows that could not be computed.
-    """
-
-    computed: int = 0
-    found: int = 0
-    swept: int = 0
+    computed: int = 0  # cells computed now
+    found: int = 0  # cells already stored
+    # names of corrupt cells that were computed again
     quarantined: list[str] = field(default_factory=list)
     rows: list[Path] = field(default_factory=list)
-    missing: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)  # cells and rows that could not be computed
 
 
 @dataclass(frozen=True)
@@ -95,13 +89,9 @@ def run(
     options: Options,
     start: Callable[[int], Advance] = lambda total: lambda: None,
 ) -> Report:
-    """Compute the missing cells of rows, and write each row as soon as its last cell is done.
-
-    ``start`` is called with the number of cells to compute; it returns the callback after each.
-    """
+    """Compute the missing cells of rows; write each row as soon as its last cell is done."""
     store, cluster = Store(options.cells), options.cluster
-    report = Report(swept=store.sweep() + sweep(options.out))
-    before = set(store.quarantined())
+    report, before = Report(), set(store.quarantined())
     chosen = plans(pairs)
     requested = {key: cell for plan in chosen for key, cell in plan.cells.items()}
     if options.force:

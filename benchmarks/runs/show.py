@@ -1,7 +1,5 @@
 """Run and drawing of one episode. Matplotlib is imported when a figure is drawn."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -58,10 +56,7 @@ def _film(path: Path | None, env: Any) -> Iterator[rollout.Watch | None]:
 
 
 def summary(episode: rollout.Episode, content: Mapping[str, Any]) -> dict[str, float]:
-    """Return the common scores of an episode, without the scales of costs.
-
-    An episode that is shorter than twice its settling window is scored in its second half.
-    """
+    """Return the common scores of an episode; of its second half if it is short."""
     last = float(episode.signals["time"][-1])
     settle = min(float(content["settle_seconds"]), 0.5 * last)
     common = {"settle_seconds": settle, "cost_scales": {}, "metrics": ()}

@@ -5,12 +5,9 @@ leaves the old file or the new one. A file that ends in ``.xz`` is compressed JS
 episodes as columns: one list of values per key, for episodes with the same keys.
 """
 
-from __future__ import annotations
-
 import json
 import lzma
 import os
-import socket
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.identity.hashing import digest, plain
+from sweeps.files import write_bytes
 
 VOLATILE = "volatile"
 CHECKSUM = "checksum"
 COMPRESSED = ".xz"
 EPISODES, SCORES = "episodes", "scores"
-_SUFFIX = ".tmp"
 
 
 def comparable(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -44,22 +41,6 @@ def write_all(folder: Path, texts: Mapping[str, str], owned: Sequence[str]) -> l
     for path in {path for pattern in owned for path in folder.glob(pattern)} - written.keys():
         path.unlink()
     return list(written)
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """Replace a file by ``content``, atomically: temporary file, fsync, rename."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.parent / f".{path.name}.{socket.gethostname()}.{os.getpid()}{_SUFFIX}"
-    with open(temporary, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(temporary, path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
 
 
 def seal(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -192,28 +173,3 @@ class Store:
         """Return the names of the files that were set aside."""
         aside = self.folder / "quarantine"
         return sorted(file.name for file in aside.iterdir()) if aside.is_dir() else []
-
-    def sweep(self) -> int:
-        """Remove temporary files of ended processes; see :func:`sweep`."""
-        return sweep(self.folder)
-
-
-def sweep(folder: Path) -> int:
-    """Remove half-written files of this machine's ended processes from ``folder``."""
-    removed = 0
-    for file in folder.rglob(f".*{_SUFFIX}") if folder.is_dir() else ():
-        *_, host, process = file.name[: -len(_SUFFIX)].rsplit(".", 2)
-        if host == socket.gethostname() and not _alive(process):
-            file.unlink(missing_ok=True)
-            removed += 1
-    return removed
-
-
-def _alive(process: str) -> bool:
-    try:
-        os.kill(int(process), 0)
-    except (ValueError, ProcessLookupError):
-        return False
-    except PermissionError:
-        return True
-    return True

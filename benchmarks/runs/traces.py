@@ -1,7 +1,5 @@
 """Trajectories of a few episodes, thinned and rounded, for the pictures of a row."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,10 +11,8 @@ from benchmarks.scenarios.scenario import ScenarioSet
 Array = NDArray[np.float64]
 Signals = Mapping[str, Array]
 
-POINTS = 400
-"""Largest number of samples of a signal."""
-GRID = 2_000
-"""Steps of the grid over a signal's range; a picture is at most 220 pixels high."""
+POINTS = 400  # largest number of samples of a signal
+GRID = 2_000  # steps of the grid over a signal's range; a picture is at most 220 pixels high
 
 
 _PRESSURES: tuple[tuple[str, ...], ...] = (

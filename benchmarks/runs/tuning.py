@@ -14,8 +14,6 @@ A trial's proposal depends on the finished trials and the seed alone, so that an
 is resumed by the same command. One process at a time works on a search.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import statistics
 from collections import defaultdict
@@ -36,7 +34,7 @@ from agents.settings.seeds import MOST_TUNING, tuning
 from baselines.core import catalogue, tuned
 from baselines.core.entry import Bounds, Knobs
 from baselines.core.tuned import Tuned, tuned_name
-from benchmarks.identity.hashing import SOURCES, digest, sources_digest
+from benchmarks.identity.hashing import digest
 from benchmarks.runs import cells, controllers
 from benchmarks.runs.store import write_text
 from benchmarks.scenarios import scenario as scenarios
@@ -44,35 +42,29 @@ from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scenarios.scenario_env import make_env, model_of
 from benchmarks.scoring.metrics import COST_FLOOR, COST_RATIO, COSTS, headline_of
 from pam_envs.envs.registration import full_id
+from sweeps.files import SOURCES, sources_digest
 from sweeps.progress import Start
 
 TRIALS = 20
 EPISODES = 30
-STARTUP = 8
-"""Initial trials, drawn uniformly before the sampler uses their results."""
-MOST_RATIO = 100.0
-"""Upper limit of the excess of one cost."""
+STARTUP = 8  # initial trials, drawn uniformly before the sampler uses their results
+MOST_RATIO = 100.0  # upper limit of the excess of one cost
 STORAGE = controllers.ROOT / "runs" / "tuning.db"
 UNTUNED = "untuned"
 SPLIT = "tuning"
-DIGITS = 4
-"""Significant digits of a factor."""
+DIGITS = 4  # significant digits of a factor
 
 
 @dataclass(frozen=True)
 class Job:
-    """A search; its storage, an SQLite file, may hold searches of other controllers.
-
-    ``trials`` are settings to try, those of earlier calls counted in; ``episodes`` are those of
-    each trial, rounded up to as many for each scenario; ``seed`` is that of the sampler.
-    """
+    """A search."""
 
     controller: str
     env: str
-    trials: int = TRIALS
-    seed: int = 0
-    episodes: int = EPISODES
-    storage: Path = STORAGE
+    trials: int = TRIALS  # settings to try, those of earlier calls counted in
+    seed: int = 0  # of the sampler
+    episodes: int = EPISODES  # of each trial, rounded up to as many for each scenario
+    storage: Path = STORAGE  # SQLite file, which may hold searches of other controllers
 
     @property
     def bounds(self) -> Bounds:
@@ -88,10 +80,7 @@ class Job:
 
 
 def job_of(controller: str, env: str = "", **how: Any) -> Job:
-    """Return a search, its arguments checked; ``how`` is the rest of :class:`Job`.
-
-    The environment may be given by the last part of its id, or left out if there is only one.
-    """
+    """Return a checked search; ``env`` may be short, or left out if there is only one."""
     entry = catalogue.PUBLISHED.get(controller)
     if entry is None or not entry.knobs:
         known = [name for name, other in catalogue.PUBLISHED.items() if other.knobs]
@@ -123,16 +112,12 @@ def nominal_track(env: str) -> ScenarioSet:
 
 @dataclass(frozen=True)
 class Measured:
-    """Result of a controller in the tuning episodes.
+    """Result of a controller in the tuning episodes."""
 
-    ``error`` is the headline's geometric mean over kinds of reference, ``mean`` its mean over all
-    episodes [SI]; ``costs`` are means over all episodes.
-    """
-
-    error: float
-    mean: float
+    error: float  # headline's geometric mean over kinds of reference [SI]
+    mean: float  # headline's mean over all episodes [SI]
     failures: int
-    costs: Mapping[str, float]
+    costs: Mapping[str, float]  # means over all episodes
 
 
 class Course:

@@ -1,7 +1,5 @@
 """Verification record beside the rows: reproduced rows, date, and exactness."""
 
-from __future__ import annotations
-
 import datetime
 import json
 from collections.abc import Mapping
@@ -39,10 +37,7 @@ def of(row: Mapping[str, Any], found: Found) -> Mapping[str, Any] | None:
 
 
 def note(path: Path, checksum: str, mode: str) -> None:
-    """Record that a row was reproduced, or remove its entry if it was not (no ``checksum``).
-
-    A row that was once reproduced to the last bit keeps that mode.
-    """
+    """Record how a row was reproduced (bits stay bits); remove its entry without a checksum."""
     folder, name = path.parents[1], rows.name_of(path)
     with FileLock(folder / f".{FILE}.lock"):
         before = read(folder)

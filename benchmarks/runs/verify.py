@@ -6,8 +6,6 @@ states others may differ by rounding, and is recorded as verified within toleran
 have been rewritten since with actions that are equal within 1e-6.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -36,8 +34,7 @@ ROUNDING = 1e-4
 
 Between Zen 5 and Rocket Lake, in all episodes of the board, 1.4e-7 was the largest.
 """
-SLACK = 1e-6
-"""Share of the worst case that counts as equal, for scores near zero."""
+SLACK = 1e-6  # share of the worst case that counts as equal, for scores near zero
 DRAWN = 1e-3
 """Largest deviation of a plotted signal, as a share of its range: two steps of its grid."""
 ROUNDED = ("scores", "trajectory", "saturated")
@@ -46,19 +43,14 @@ ROUNDED = ("scores", "trajectory", "saturated")
 
 @dataclass
 class Verdict:
-    """Result of computing a row again.
-
-    It was compared to the last bit, or within the rounding of another machine (``mode``); plotted
-    curves, which are rounded to a grid, always to ``DRAWN``.
-    ``drifted`` are the fields that differ, with both values; ``notes`` are differences that are no
-    drift by themselves: versions, commit, description. ``checksum`` is that of the row's file.
-    """
+    """Result of computing a row again; plotted curves are always compared to DRAWN."""
 
     row: str
-    mode: str = verified.BITS
-    drifted: list[str] = field(default_factory=list)
+    mode: str = verified.BITS  # compared to the last bit, or within the rounding of another machine
+    drifted: list[str] = field(default_factory=list)  # fields that differ, with both values
+    # differences that are no drift by themselves: versions, commit, description
     notes: list[str] = field(default_factory=list)
-    checksum: str = ""
+    checksum: str = ""  # of the row's file
 
     @property
     def holds(self) -> bool:
@@ -196,10 +188,7 @@ def _described(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def beyond_rounding(before: Record, after: Record) -> list[str]:
-    """Return a line for every difference of two rows beyond rounding between machines.
-
-    Every episode is compared, not their mean: free episodes would allow any interval.
-    """
+    """Return a line for every difference beyond rounding between machines, of any episode."""
     found = differences(_exact(before), _exact(after))
     old, new = (
         [_without(episode, *ROUNDED) for episode in row["episodes"]] for row in (before, after)
@@ -246,10 +235,7 @@ def _other_curves(old: list[Any], new: list[Any]) -> Iterator[str]:
 def differences(
     old: Any, new: Any, where: str = "", tolerance: float = 0.0, slack: float = 0.0
 ) -> list[str]:
-    """Return a line, with both values, for every leaf in which two plain values differ.
-
-    ``tolerance`` and ``slack`` are the relative and absolute differences that count as equal.
-    """
+    """Return a line for every leaf in which two values differ by more than the tolerances."""
     return list(_differences(old, new, where, tolerance, slack))
 
 

@@ -1,7 +1,5 @@
 """Group of metrics that a scenario file asks for by name: values, units and table columns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,8 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Column = tuple[str, str, float]
-"""Metric, heading and factor from SI."""
+Column = tuple[str, str, float]  # metric, heading and factor from SI
 
 DEGREES = float(np.degrees(1.0))
 EFFORT: tuple[Column, ...] = (
@@ -25,17 +22,13 @@ OUT_OF_REACH: Column = ("saturated_time", "out of reach [%]", 100.0)
 
 @dataclass(frozen=True)
 class Record:
-    """Recorded signals of one episode, (n,) arrays in SI, and the samples that are scored.
-
-    ``window`` is after settling, ``tracked`` where the output is tracked as well; the period is in
-    seconds, the content that of the scenario file.
-    """
+    """Recorded signals of one episode, (n,) arrays in SI, and the samples that are scored."""
 
     signals: Mapping[str, Array]
-    window: Mask
-    tracked: Mask
-    period: float
-    content: Mapping[str, Any]
+    window: Mask  # samples after settling
+    tracked: Mask  # where the output is tracked as well
+    period: float  # [s]
+    content: Mapping[str, Any]  # of the scenario file
 
     def rate(self, signal: str) -> float:
         """Return the sum of a signal over the window per second."""
@@ -45,33 +38,18 @@ class Record:
 
 @dataclass(frozen=True)
 class Group:
-    """Metrics beside the common ones, less is better for all.
+    """Metrics beside the common ones, less is better for all."""
 
-    Attributes
-    ----------
-    name : str
-        As in a scenario file: ``metrics: [gait]``.
-    units : mapping of str
-        SI unit of each metric.
-    score : callable
-        From a record to the value of each metric.
-    columns : callable
-        From the columns of the common errors (p95, max, steady, sensed) to all after the headline.
-    needs : tuple of str
-        Entries that the scenario file must have.
-    costs : mapping of str
-        Metrics that count as the cost of a lower error, with their names.
-    path : callable, optional
-        From signals to the (n,) array that rests where a steady-state error is scored; the
-        reference by default.
-    """
-
-    name: str
-    units: Mapping[str, str]
+    name: str  # as in a scenario file: ``metrics: [gait]``
+    units: Mapping[str, str]  # SI unit of each metric
     score: Callable[[Record], dict[str, float]]
+    # from the columns of the common errors (p95, max, steady, sensed) to all after the headline
     columns: Callable[[tuple[Column, ...]], tuple[Column, ...]]
-    needs: tuple[str, ...] = ()
-    costs: Mapping[str, str] = field(default_factory=dict)
+    needs: tuple[str, ...] = ()  # entries that the scenario file must have
+    headline: tuple[Column, ...] = ()  # beside the RMS in the first tables; ranks follow the RMS
+    costs: Mapping[str, str] = field(default_factory=dict)  # names of metrics that count as costs
+    # from signals to the (n,) array that rests where a steady-state error is scored; default: the
+    # reference
     path: Callable[[Mapping[str, Array]], Array] | None = None
 
 

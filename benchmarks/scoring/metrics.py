@@ -4,8 +4,6 @@ All arrays have one entry per control period and are in SI. The headline compare
 with the external reference; sensed values are scored in addition, never instead.
 """
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Mapping
@@ -69,6 +67,11 @@ def headline_of(content: Mapping[str, Any]) -> str:
     return str(content.get("headline", HEADLINE))
 
 
+def headlines_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
+    """Return the metrics beside the RMS in a track's first tables, declared by its groups."""
+    return tuple(column for group in groups_of(content) for column in group.headline)
+
+
 def shown(content: Mapping[str, Any]) -> tuple[str, float]:
     """Return the unit in which errors are shown, and its factor from SI; mm by default."""
     how = content.get("shown") or {"unit": "mm", "factor": 1e3}
@@ -122,20 +125,10 @@ def score(
 ) -> dict[str, float]:
     """Return every metric of one finished episode.
 
-    Parameters
-    ----------
-    signals : mapping of (n,) array
-        Recorded ``info`` of the steps 1 to n by its keys, SI.
-    period : float [s]
-        Control period.
-    content : mapping
-        Of the scenario file. The constraint cost is of the whole episode, everything else of the
-        time after ``settle_seconds``, where all signals of its ``gate`` are 1.
-
-    Raises
-    ------
-    ValueError
-        If no samples remain after the settling window, or none of them is tracked.
+    ``signals`` are the recorded ``info`` of the steps 1 to n by its keys, shape (n,), SI;
+    ``period`` is the control period [s], ``content`` that of the scenario file. The constraint cost
+    is of the whole episode, everything else of the time after ``settle_seconds``, where all signals
+    of its ``gate`` are 1. A ValueError says that no such samples remain.
     """
     time, settle = np.asarray(signals["time"]), float(content["settle_seconds"])
     window = time > settle + 0.5 * period
@@ -173,10 +166,7 @@ def score(
 
 
 def worst_of(scores: Mapping[str, float], worst: Mapping[str, float]) -> dict[str, float]:
-    """Return the scores of an episode that ended early: the worst case, or worse if it was.
-
-    ``scores`` has what could be measured until the end; it may be empty or NaN.
-    """
+    """Return the scores of an episode that ended early: the worst case, or worse if it was."""
     measured = {name: scores.get(name, float("nan")) for name in worst}
     return {name: float(np.fmax(value, measured[name])) for name, value in worst.items()}
 

@@ -14,8 +14,6 @@ seed. A group of n is resampled by n - 1 draws: with n draws an interval would b
 sqrt((n - 1) / n), a tenth for five seeds (rao1988, p. 231).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -28,8 +26,7 @@ from scipy import stats
 BOOTSTRAP_SEED = 20_000_003
 RESAMPLES = 5000
 _BOUNDS = (0.025, 0.975)
-_LARGEST = 4_000_000
-"""Limit of the size of an array of resamples."""
+_LARGEST = 4_000_000  # limit of the size of an array of resamples
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -69,12 +66,8 @@ def crossed(
 ) -> tuple[Array, list[Any]]:
     """Return samples as a table of runs by pairs, and the pairs; both in ascending order.
 
-    ``runs`` and ``pairs`` are the training seed and the paired episode of each of n samples.
-
-    Raises
-    ------
-    ValueError
-        If an episode of a run is missing or duplicated.
+    ``runs`` and ``pairs`` are the training seed and the paired episode of each of n samples. A
+    ValueError says that an episode of a run is missing or duplicated.
     """
     rows, columns = (
         {label: k for k, label in enumerate(sorted(set(labels)))} for labels in (runs, pairs)
@@ -193,7 +186,8 @@ def probability_of_improvement(first: ArrayLike, second: ArrayLike, strata: Arra
     """
     a, b = np.atleast_2d(np.asarray(first, float)), np.atleast_2d(np.asarray(second, float))
     below = (a[:, None] < b[None]) + 0.5 * (a[:, None] == b[None])
-    columns = draw_clusters(strata, RESAMPLES, BOOTSTRAP_SEED)
+    labels = tuple(np.asarray(strata).tolist())
+    columns = _drawn(_clusters, labels, RESAMPLES, BOOTSTRAP_SEED)
     # counts and halves: every sum is exact, so that its order does not matter
     ours, theirs = (_run_counts(table, RESAMPLES, number) for number, table in enumerate((a, b)))
     hits = np.einsum("ra,rb,abk->rk", ours, theirs, below, optimize=True)
@@ -229,14 +223,6 @@ def resample_indices(strata: ArrayLike, resamples: int, seed: int) -> Indices:
     return _drawn(_within, tuple(np.asarray(strata).tolist()), resamples, seed)
 
 
-def draw_clusters(strata: ArrayLike, resamples: int, seed: int) -> Indices:
-    """Return indices of resamples of whole strata and of the samples within each drawn one.
-
-    ``strata`` are the labels of n samples, all strata of one size; shape (resamples, m).
-    """
-    return _drawn(_clusters, tuple(np.asarray(strata).tolist()), resamples, seed)
-
-
 Draw = Callable[[list[Indices], np.random.Generator, int], Indices]
 
 
@@ -260,6 +246,7 @@ def _within(members: list[Indices], generator: np.random.Generator, resamples: i
 
 
 def _clusters(members: list[Indices], generator: np.random.Generator, resamples: int) -> Indices:
+    """Return indices (resamples, m) of whole strata, all of one size, and of samples within."""
     sizes = {len(rows) for rows in members}
     if len(sizes) != 1:
         raise ValueError(f"strata of {sorted(sizes)} samples: run all of them with the same seeds")

@@ -1,7 +1,5 @@
 """Wall time of a diagnosis: ten minutes at 50 Hz, from the file to the written report."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import os

@@ -1,7 +1,5 @@
 """Groups of probes, measured one after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from benchmarks.speed import probes
@@ -9,8 +7,7 @@ from benchmarks.speed.diagnosis import diagnosing
 from benchmarks.speed.learning import learning, shares
 from benchmarks.speed.rates import Measurement, Missing
 
-Probe = Callable[[int], list[Measurement]]
-"""Takes the number of rounds."""
+Probe = Callable[[int], list[Measurement]]  # takes the number of rounds
 Start = Callable[[int], Callable[[], None]]
 """Takes the number of groups and returns a function to call after each."""
 

@@ -1,7 +1,5 @@
 """Speed of training, and the environments' share of its time."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Callable, Iterator
@@ -10,8 +8,7 @@ from typing import Any
 from benchmarks.speed.rates import Chunk, Measurement, interleaved, median, ratio
 
 ENV = "PAM/MusclePositioning-v0"
-MOST = 0.05
-"""The largest share of a training's time that its environments may take."""
+MOST = 0.05  # the largest share of a training's time that its environments may take
 
 
 def learning(rounds: int) -> list[Measurement]:

@@ -1,7 +1,5 @@
 """Probes of environments, batches, start-up and training; a missing library omits only its line."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -24,8 +22,7 @@ KNEE = "PAM/KneeWalk-v0"
 ELBOW = "PAM/ElbowOrthosis-v0"
 ROOT = Path(__file__).resolve().parents[2]
 JOINT, ARM = "PAM/AntagonisticJoint-v0", "PAM/RedundantManipulator-v0"
-REPEATS = 5
-"""Repetitions of each planned path, there and back."""
+REPEATS = 5  # repetitions of each planned path, there and back
 PENDULUM, CARTPOLE, HOPPER = "InvertedPendulum-v5", "CartPole-v1", "Hopper-v5"
 
 

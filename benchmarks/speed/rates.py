@@ -4,8 +4,6 @@ A rate is the median over rounds, a ratio the median of the ratios within each r
 busy machine slows both sides equally. Times are CPU seconds of the process unless *wall* is stated.
 """
 
-from __future__ import annotations
-
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -15,8 +13,7 @@ from typing import Any, Literal
 from benchmarks.papers.published import aligned
 from benchmarks.runs import provenance
 
-Chunk = Callable[[], int]
-"""Does some work and returns its number of environment steps."""
+Chunk = Callable[[], int]  # does some work and returns its number of environment steps
 
 
 class Missing(Exception):
@@ -25,17 +22,14 @@ class Missing(Exception):
 
 @dataclass(frozen=True)
 class Measurement:
-    """One measured figure beside its floor (required) and aim (desired).
-
-    ``value`` is None if it could not be measured; ``note`` says why.
-    """
+    """One measured figure."""
 
     group: str
     name: str
-    value: float | None
+    value: float | None  # None if it could not be measured; note says why
     unit: str = "x"
-    floor: float | None = None
-    aim: float | None = None
+    floor: float | None = None  # required
+    aim: float | None = None  # desired
     better: Literal["more", "less"] = "more"
     note: str = ""
 

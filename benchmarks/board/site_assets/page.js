@@ -38,6 +38,9 @@ function columns(track) {
     { key: "knows", title: "knows", value: (r) => r.knows, show: (r) => r.knows, kind: "short" },
     { key: "score", title: `${track.split} RMS [${track.unit}] [95 %]`, value: (r) => r.score?.[0] ?? null, show: (r) => bounded(r.score), number: true },
     { key: "picture", title: "", show: (r) => (r.score ? intervalPicture(r.score, range, paper) : "–") },
+    ...track.headlines.map((title, k) => ({
+      key: `h${k}`, title: `${title} [95 %]`, value: (r) => r.headlines[k]?.[0] ?? null, show: (r) => bounded(r.headlines[k]), number: true,
+    })),
     some("chance") && { key: "chance", title: `P(improvement), ${track.split} episodes`, value: (r) => r.chance?.[0] ?? null, show: (r) => chance(r.chance), number: true },
     { key: "iqm", title: `IQM [${track.unit}]`, value: (r) => r.iqm?.[0] ?? null, show: (r) => number(r.iqm?.[0]), number: true },
     some("gap") && { key: "public", title: `public RMS [${track.unit}]`, value: (r) => r.public?.[0] ?? null, show: (r) => number(r.public?.[0]), number: true },
@@ -131,14 +134,18 @@ function headed(heading, lines) {
 }
 
 function renderWinners() {
-  const heading = ["environment", "verdict", "best paper controller", "best learned controller", "lower by [95 %]", "P [95 %]", "largest cost", "episodes", "in full"];
-  const both = (name, score) => [make("span", { class: "name" }, name), make("br"), make("span", { class: "soft" }, score)];
+  const titles = [...new Set(BOARD.winners.flatMap((entry) => Object.keys(entry.paper_scores)))];
+  const scores = titles.map((title) => `${title} [95 %]`);
+  const heading = ["environment", "verdict", "best paper controller", ...scores, "best learned controller", ...scores, "lower by [95 %]", "P [95 %]", "largest cost", "episodes", "in full"];
+  const scored = (name, found) => [
+    make("td", { class: "name" }, name), ...titles.map((title) => make("td", { class: "short" }, found[title] ?? "–")),
+  ];
   const lines = BOARD.winners.map((entry) => {
     const line = make("tr", { class: "pick", tabindex: "0", "data-track": entry.track });
     line.append(
       make("td", { class: "name" }, entry.env),
       make("td", { class: entry.better ? "verdict good" : "verdict" }, entry.verdict.split(" (")[0]),
-      make("td", {}, ...both(entry.paper, entry.paper_score)), make("td", {}, ...both(entry.learned, entry.learned_score)),
+      ...scored(entry.paper, entry.paper_scores), ...scored(entry.learned, entry.learned_scores),
       make("td", { class: "short" }, entry.gain),
       make("td", { class: "short" }, chance(entry.chance)), make("td", {}, entry.cost),
       make("td", {}, entry.split || "–"), make("td", { class: "soft" }, entry.verdict),

@@ -6,17 +6,13 @@ nearly slack, since friction grows with their forces. Errors are against the ref
 angle.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.scoring.group import EFFORT, OUT_OF_REACH, Column, Group, Record, rms
 from pam_envs.tasks.torque_stiffness import FREE
 
-NEAR = 0.2
-"""Angle [rad] at which an error of the stiffness counts: 11 degrees."""
-LEAST = 1e-6
-"""Smallest clipping [N m], [N m/rad] that counts as one."""
+NEAR = 0.2  # angle [rad] at which an error of the stiffness counts: 11 degrees
+LEAST = 1e-6  # smallest clipping [N m], [N m/rad] that counts as one
 UNITS = {
     "impedance_rms": "N m",
     "stiffness_rms": "N m/rad",

@@ -4,8 +4,6 @@ A gait is scored by phase: the tension in stance, the angle in swing. Periods in
 phase differs from the true one, by noise, count for neither.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -52,9 +50,10 @@ did. Reading B takes the demand to be all of Eq. (1), twice that of A, and activ
 square of torque, so that a small torque held against for long costs little. Open at 4.5 bar the
 walk has 1.14, by A 1.66, by B 0.77; on stairs, where the knee asks for more than the muscle has,
 all three fall below 1."""
+EMG_EFFORT: Column = ("emg_effort", "EMG effort", 1.0)
 _SATURATED: Column = ("saturated_time", "true pressure at capacity [%]", 100.0)
 GAIT_COLUMNS: tuple[Column, ...] = (
-    ("emg_effort", "EMG effort", 1.0),
+    EMG_EFFORT,
     RMS_PERCENT,
     ("angle_rms", "swing: angle RMS [deg]", DEGREES),
     ("switch_error", "error at the switch [N]", 1.0),
@@ -71,12 +70,9 @@ GAIT_COLUMNS: tuple[Column, ...] = (
     _SATURATED,
 )
 
-JUMP_SECONDS = 0.5
-"""Window after a switch to stance for the error of the tension."""
-BRIEF_SECONDS = 0.1
-"""After a switch, in which the pressure's largest change is its jump."""
-SWING_SECONDS = 0.3
-"""Shortest swing before a landing: a heel that is lifted chatters."""
+JUMP_SECONDS = 0.5  # window after a switch to stance for the error of the tension
+BRIEF_SECONDS = 0.1  # after a switch, in which the pressure's largest change is its jump
+SWING_SECONDS = 0.3  # shortest swing before a landing: a heel that is lifted chatters
 
 
 def half_range(reference: Array) -> float:
@@ -221,5 +217,6 @@ GAIT = Group(
     of_gait,
     lambda errors: GAIT_COLUMNS,
     needs=("activity",),
+    headline=(EMG_EFFORT,),
     costs={"emg_effort": "EMG effort"},
 )
