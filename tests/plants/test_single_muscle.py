@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.protocol import kinds
 from pam_envs.kernels.build import COMPILED
+from pam_envs.plants.single_muscle.hysteresis import Hysteresis
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rollout import simulate
 from pam_envs.pneumatics.regulator import regulator_step
@@ -172,6 +173,14 @@ def test_neutral_effects_change_no_bit() -> None:
     assert not np.array_equal(
         simulate(plant, random)["contraction"], simulate(other, random)["contraction"]
     )
+
+
+@pytest.mark.parametrize("name", Hysteresis.pressure_only)
+def test_settings_that_friction_driven_by_length_lacks_are_refused(name: str) -> None:
+    change = {f"hysteresis.{name}": 0.1}
+    SingleMuscle.mas10("preisach").replace(change)
+    with pytest.raises(ValueError, match=f"hysteresis.{name} = 0.1 acts on friction driven by pr"):
+        SingleMuscle.mas10("preisach_length").replace(change)
 
 
 def test_incomplete_plant_file_gets_defaults(tmp_path: Path) -> None:

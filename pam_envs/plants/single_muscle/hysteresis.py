@@ -15,7 +15,7 @@ from pam_envs.hysteresis.friction_effects import (
     Threshold,
 )
 from pam_envs.hysteresis.protocol import HysteresisModel, operator_of
-from pam_envs.parameters import effect, identified
+from pam_envs.parameters import declarations, effect, identified
 from pam_envs.plants.core.plant import OperatorComponent
 
 Kind: TypeAlias = str
@@ -76,6 +76,29 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, Operator
     )
     # an effect of the first cycles that only this hysteresis has
     first_width: float = effect("1", -1.0, 10.0, "extra loop width of the first travel")
+
+    pressure_only: ClassVar[dict[str, str]] = {
+        "stretch": "limit_per_pressure",
+        "width_per_load": "limit_per_load",
+        "shape": "elements with other thresholds",
+        "pressure_slope": "limit_per_pressure",
+        "pressure_bend": "limit_per_pressure",
+        "first_width": "first_loss",
+    }
+    """Parameters that friction driven by length does not have, with what it has in their place."""
+
+    def check_drive(self) -> None:
+        """Raise if a parameter is set that acts on friction driven by pressure alone."""
+        if self.operator is None or self.drive == "pressure":
+            return
+        for name, instead in self.pressure_only.items():
+            value, neutral = getattr(self, name), declarations(self)[name].neutral
+            if value != neutral:
+                raise ValueError(
+                    f"hysteresis.{name} = {value:g} acts on friction driven by pressure, and this "
+                    f"muscle's is driven by length: leave it at {neutral:g} (there: {instead}), or "
+                    "take hysteresis_drive='pressure'"
+                )
 
     def stretched(self, pressure: ArrayLike, full: float) -> NDArray[np.float64]:
         """Return ``pressure`` [Pa] on the scale on which the friction is uniform."""

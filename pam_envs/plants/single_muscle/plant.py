@@ -67,7 +67,8 @@ class SingleMuscle(Plant, rows=R):
         return Usage("a muscle", "virgin", self.regulator.max_pressure)
 
     def _check(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow."""
+        """Refuse settings without effect, and a motion that the sub-steps cannot follow."""
+        self.hysteresis.check_drive()
         m, law = self.mass, self.muscle
         strains = np.linspace(-0.02, 0.2, 45)
         slope = (

@@ -53,7 +53,7 @@ SLOW = {
 
 def muscle(**changes: float) -> SingleMuscle:
     values = {"mass.load": LOAD, "regulator.dead_time": 0.01, "hysteresis.width_per_load": 0.0}
-    return SingleMuscle.mas10().replace(values | changes)
+    return SingleMuscle.mas10("maxwell_slip").replace(values | changes)
 
 
 def short(top: float, seconds: float = 10.0) -> dict[str, np.ndarray]:

@@ -64,7 +64,7 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
             "reference": "mixed",
             "load_disturbance": 1.0,
         },
-        "effects": {"plant": SingleMuscle.mas10().replace(EVERY_EFFECT)},
+        "effects": {"plant": SingleMuscle.mas10("maxwell_slip").replace(EVERY_EFFECT)},
         "staircase": {"hysteresis": "preisach", "randomize": True, "reference": "staircase"},
         "samples": {
             "reference": [0.001 * (k // 20 % 13) for k in range(300)],
