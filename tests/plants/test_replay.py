@@ -12,7 +12,9 @@ from tests.envs.positioning.variants import EVERY_EFFECT
 
 SAMPLES = 200 if COMPILED else 60
 PERIOD = 0.02
-PLANT = SingleMuscle.mas10().replace({"regulator.dead_time": 0.0, "regulator.slew_rate": 1e9})
+PLANT = SingleMuscle.mas10("maxwell_slip").replace(
+    {"regulator.dead_time": 0.0, "regulator.slew_rate": 1e9}
+)
 
 
 def inputs(samples: int = SAMPLES) -> Inputs:
