@@ -72,9 +72,9 @@ def identify_all(
     lines = [
         "# Identification of the MAS-10-N-100 from the tables",
         "",
-        "Made by `pam-envs identify`, for hysteresis driven by pressure. RMS errors in mm, without "
-        f"the readings that are zero by definition. The repeatability floor (one repeat against "
-        f"the mean of the others) is {floor:.3f} mm.",
+        "Made by `pam-envs identify`. RMS errors in mm, without the readings that are zero by "
+        "definition. The repeatability floor (one repeat against the mean of the others) is "
+        f"{floor:.3f} mm.",
         "",
         "| hysteresis | RMS 0 kg | 2.55 kg | 4.55 kg | all | held-out repeat | widest loops, model "
         "(measured) | rank | members |",
@@ -108,10 +108,10 @@ def identify_all(
     lines += ["", congruency, "", "## Identifiability of the parameters", ""]
     found = cycles.identifiability(fits[PlayOperator.kind])
     lines += [
-        "Share (0 to 1) of each parameter in the parameter combinations that the mean readings "
-        "determine to better than 20 %. A parameter near 0 is assumed (its range is in the plant "
-        "file) or follows from the prior, equal weight on every threshold, which determines the "
-        "minor loops.",
+        "For `maxwell_slip`: share (0 to 1) of each parameter in the parameter combinations that "
+        "the mean readings determine to better than 20 %. A parameter near 0 is assumed (its range "
+        "is in the plant file) or follows from the prior, equal weight on every threshold, which "
+        "determines the minor loops.",
         "",
         "| parameter | share |",
         "|---|---|",
