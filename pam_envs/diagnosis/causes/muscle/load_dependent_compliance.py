@@ -32,8 +32,8 @@ CAUSE = Cause(
         "nonlinear in the load. Three loads cannot separate a square law from a dead zone."
     ),
     source=(
-        "positioning2021, Tables 3 to 5: the load enters as a shift of the pressure, 0.079 bar a "
-        "kilogram, growing faster than in proportion."
+        "positioning2021, Tables 3 to 5: the load enters as a shift of the pressure, 0.079 bar "
+        "per kilogram, growing faster than in proportion."
     ),
     needs=("contraction", "loads"),
     sensor="a load cell between muscle and load",
