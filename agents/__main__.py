@@ -50,7 +50,7 @@ def train(
         seed: Seed of weights, exploration and episodes; default: 0.
         out: Folder of the run; default: runs/ENV/ALGO-seedSEED.
         resume: Continue the run in that folder with its settings; only --steps may change.
-        config: YAML file, or policy.onnx, whose settings replace the preset.
+        config: YAML file or policy.onnx whose settings replace the preset.
     """
     from agents.training import sweep as sweeping
     from agents.training import train as training
@@ -131,11 +131,11 @@ def sweep(
     Args:
         seeds: Number of training seeds.
         first_seed: The first training seed.
-        jobs: Parallel trainings on this machine.
-        backend: Processes of this machine, or a running Dask cluster.
+        jobs: Parallel training runs on this machine.
+        backend: Processes on this machine (loky), or a running Dask cluster.
         address: Address of the Dask scheduler, for example tcp://host:8786.
         out: Folder of the runs.
-        dry_run: List the trainings and whether their policies exist, and stop.
+        dry_run: Only list the training runs and whether their policies exist.
     """
     from agents.training import sweep as sweeping
     from sweeps.engine import Cluster
@@ -188,7 +188,11 @@ def enter(
 
 
 def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
-    """Check a policy file and print its card: training, signals, settings, versions."""
+    """Check a policy file and print its card: training, signals, settings, versions.
+
+    Args:
+        policy: ONNX file of a policy.
+    """
     from agents.policies.policy import OnnxPolicy
 
     made = OnnxPolicy.load(policy)
@@ -196,10 +200,13 @@ def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
 
 
 def evaluations(policies: Annotated[tuple[Path, ...], tyro.conf.Positional], /) -> None:
-    """Print the evaluations on tuning seeds during training, and which policy was exported.
+    """Print the evaluations during training (tuning seeds) and the exported policy.
 
     "value" is the selection criterion. "kinds" lists the RMS error of each kind of rows, relative
     to the first evaluation (of the controller alone, for a residual policy).
+
+    Args:
+        policies: ONNX files of policies.
     """
     from agents.policies.policy import OnnxPolicy
 
@@ -257,8 +264,8 @@ def classical(env: Env, /, algo: Algo = "ppo", variant: Variant = "residual") ->
     """Evaluate the classical controllers of an environment on tuning seeds, the best first.
 
     Use the result to choose the controller that a residual policy corrects; the leaderboard does
-    not use it. The preset defines plants, references and the first number
-    (evaluation.objective).
+    not use it. The preset defines plants, references and the criterion (evaluation.objective), the
+    first number.
     """
     from agents.training.evaluation import evaluate, value_of
     from baselines.core.catalogue import CONTROLLERS

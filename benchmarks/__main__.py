@@ -45,13 +45,13 @@ def run(
     dry_run: bool = False,
     options: Options = OPTIONS,
 ) -> int:
-    """Score controllers over the scenario files, one JSON a row; an interrupted run resumes.
+    """Run controllers in the scenarios, one file per row; an interrupted run resumes.
 
     Args:
         env: Id of an environment; all by default.
         controller: Names of controllers; all by default.
         track: Names of scenario files, or paths of such files; all files by default.
-        dry_run: List the cells and whether they are stored, and stop.
+        dry_run: Only list the cells and whether they are stored.
     """
     from benchmarks import console
 
@@ -80,7 +80,7 @@ def audit(
     all: bool = False,
     options: Options = OPTIONS,
 ) -> int:
-    """Draw a round of seeds for all controllers of a track, and score them on it.
+    """Draw a round of audit seeds for a track and run all its controllers on it.
 
     No round is drawn if nothing has changed since the last one.
 
@@ -105,7 +105,7 @@ def audit(
 
 
 def cite(row: Positional[tuple[str, ...]]) -> int:
-    """Print BibTeX of rows, of this package and of the methods in them.
+    """Print BibTeX of rows, of this package and of the methods used.
 
     Args:
         row: Files or names of rows.
@@ -118,11 +118,11 @@ def cite(row: Positional[tuple[str, ...]]) -> int:
 
 
 def show_row(row: Positional[tuple[str, ...]], json: bool = False) -> int:
-    """Print rows: origin, scores of both splits, every metric and setting.
+    """Print rows: origin, public and audit scores, all metrics and settings.
 
     Args:
         row: Files or names of rows.
-        json: Print the complete row instead, as JSON with every digit.
+        json: Print the complete row as JSON, at full precision.
     """
     from json import dumps
 
@@ -134,11 +134,11 @@ def show_row(row: Positional[tuple[str, ...]], json: bool = False) -> int:
 
 
 def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
-    """Write LEADERBOARD.md and a page with figures for each environment from the rows.
+    """Write LEADERBOARD.md and a page with figures for each environment.
 
     Args:
         results: Folder of the rows.
-        out: The board's file; the pages are written beside it, into leaderboard.
+        out: File of the board; the pages go to the folder leaderboard beside it.
     """
     from benchmarks.board import leaderboard
 
@@ -148,7 +148,7 @@ def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
 
 
 def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
-    """Write the page of the rows: one folder, no server and no network.
+    """Write the interactive page of all rows: one folder of static files.
 
     Args:
         results: Folder of the rows.
@@ -166,10 +166,10 @@ def verify(
     all: bool = False,
     options: Computing = COMPUTING,
 ) -> int:
-    """Compute rows again and compare; exit code 1 if one has drifted.
+    """Compute rows again and compare; exit code 1 if one is not reproduced.
 
     A row must be reproduced to the last bit, or within rounding if it was made with other packages
-    or on another processor. The result is noted in verified.json beside the rows.
+    or on another processor. The result is stored in verified.json beside the rows.
 
     Args:
         row: Files or names of rows.
@@ -191,9 +191,9 @@ def verify(
 
 
 def void(row: Positional[tuple[str, ...]] = (), all: bool = False) -> int:
-    """List rows whose task or controller has changed in behaviour; exit code 1 if there are any.
+    """List rows whose task or controller has changed behaviour; exit code 1 if there are any.
 
-    Every environment runs one short episode and every controller gets stored observations; no
+    Every environment runs one short episode and every controller acts on stored observations; no
     row is computed again.
 
     Args:
@@ -238,14 +238,14 @@ def tune(
     write: bool = False,
     storage: Path | None = None,
 ) -> int:
-    """Search a paper controller's free parameters on tuning seeds; an interrupted search resumes.
+    """Tune the free parameters of a classical controller; an interrupted search resumes.
 
     Args:
-        controller: Name of a controller with knobs.
-        env: Id of the environment, where the controller runs in several.
+        controller: Name of a controller with free parameters (knobs).
+        env: Id of the environment, if the controller runs in several.
         trials: Number of settings to try, including those of earlier calls.
         seed: Seed of the sampler.
-        episodes: Smallest number of episodes of each trial.
+        episodes: Minimum number of episodes per trial.
         write: Write the result into baselines/core/tuned.yaml, which the catalogue reads.
         storage: SQLite file of the trials, runs/tuning.db by default.
     """
@@ -267,12 +267,12 @@ def tune(
 def papers(
     paper: tuple[str, ...] = (), place: tuple[str, ...] = (), json: Path | None = None
 ) -> int:
-    """Compare printed figures with ours; exit code 1 if one differs without a reason.
+    """Compare published figures with this package; exit code 1 if a difference has no reason.
 
     Args:
         paper: Only these papers, for example yeh2010. All by default.
         place: Only these places, for example 'Eq. (10)' or 'Fig. 7'. All by default.
-        json: Also write them to this file.
+        json: Also write the comparison to this file.
     """
     from benchmarks.papers.figures import all_figures
     from benchmarks.papers.inventory import summary
@@ -289,10 +289,10 @@ def papers(
 
 
 def effort(seeds: int = 10, wearer: Literal["prescribed", "adaptive"] = "prescribed") -> int:
-    """Print the EMG-proxy effort of gaits without, with perfect and with random assistance.
+    """Print the EMG-proxy effort of gaits: no, perfect and random assistance.
 
     Args:
-        seeds: Episodes of each controller.
+        seeds: Number of episodes (seeds) of each controller.
         wearer: Wearer of the orthosis.
     """
     from benchmarks.effort import efforts
@@ -317,13 +317,13 @@ def energy(cycles: int = 2000, seed: int = 0) -> int:
 def speed(
     only: tuple[str, ...] = (), rounds: int = 7, json: Path | None = None, strict: bool = False
 ) -> int:
-    """Measure rates against other environments, interleaved, and compare with the targets.
+    """Measure speed, interleaved with other environments, and compare with the targets.
 
     Args:
         only: Groups to measure: single, batch, plain, start, learning, diagnosis. All by default.
-        rounds: Interleaved rounds; the median counts.
+        rounds: Number of interleaved rounds; the median counts.
         json: Also write the figures to this file.
-        strict: Exit code 1 if a floor is missed.
+        strict: Exit code 1 if a minimum is missed.
     """
     from benchmarks.runs.store import write_record
     from benchmarks.speed import groups, rates
@@ -350,9 +350,9 @@ class Arguments:
     episode_seconds: float | None = None
     """Duration [s]."""
     load_disturbance: float | None = None
-    """Unmeasured change [kg] of the load."""
+    """Unmeasured step of the load [kg]."""
     randomize: bool = False
-    """Draw the plant's assumed parameters."""
+    """Draw the assumed parameters of the plant."""
 
 
 def show(
@@ -363,14 +363,14 @@ def show(
     video: Path | None = None,
     arguments: Annotated[Arguments, arg(name="")] = Arguments(),
 ) -> int:
-    """Run one episode and draw it: reference, output, setpoints, pressure, loop.
+    """Run one episode and plot reference, output, setpoints, pressure and hysteresis loop.
 
     Args:
         env: Id of the environment.
         controller: Name of a controller.
-        seed: Of the reset.
-        plot: Picture to write.
-        video: Film to write.
+        seed: Seed of the reset.
+        plot: Image file to write.
+        video: Video file to write.
     """
     from benchmarks.runs import show as showing
 
@@ -411,22 +411,22 @@ def diagnosis(
     out: Path | None = None,
     computing: Computing = COMPUTING,
 ) -> int:
-    """Diagnose rigs that hide an effect and score the findings; an interrupted run resumes.
+    """Benchmark the diagnosis on simulated rigs with hidden effects; an interrupted run resumes.
 
     Args:
         chosen: Set of cases.
-        offset: Number of the draw; another number gives other cases.
-        fraction: Part of the cases of every kind and cause, for a quick look.
+        offset: Number of the random draw of cases.
+        fraction: Fraction of the cases of every kind and cause, for a quick run.
         kind: Only cases of these kinds.
-        name: Only cases that hide one of these effects.
-        limit: Largest number of cases.
-        loops: Cases of every cause that are run in closed loop on the hidden rig.
-        next: Carry out the experiments that are proposed.
+        name: Only cases with one of these hidden effects.
+        limit: Maximum number of cases.
+        loops: Number of cases per cause that are run in closed loop on the hidden rig.
+        next: Run the proposed experiments.
         force: Compute stored cases again.
-        timed: Also time whole reports of ten minutes at 50 Hz on two cores, afterwards.
+        timed: Also time complete reports of ten minutes at 50 Hz, on two cores.
         cells: Folder of the records, which are the checkpoint.
-        out: Folder of the page, its numbers and its figure. By default benchmarks/results for the
-        whole final set, otherwise beside the records.
+        out: Folder of the page with numbers and figure; default: benchmarks/results for the
+            complete final set, otherwise beside the records.
     """
     from benchmarks.diagnosis import report as telling
     from benchmarks.diagnosis import run as running

@@ -99,7 +99,7 @@ def render(
     fps: int = 25,
     gif: bool = False,
 ) -> None:
-    """Film an environment under the inverse of its plant.
+    """Write a video of an environment controlled by the inverse of its plant.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def render(
     seconds : float
         Length of the episode [s].
     hysteresis : str
-        The muscle's hysteresis.
+        Hysteresis model.
     reference : str
         Family of references; default: the environment's, a staircase for MusclePositioning.
     load : float
@@ -118,9 +118,9 @@ def render(
     seed : int
         Seed of the episode.
     fps : int
-        Pictures a second.
+        Frames per second.
     gif : bool
-        Write a .gif instead of a .mp4 (so does --video NAME.gif).
+        Write a .gif instead of an .mp4 (as --video NAME.gif does).
     """
     name = env_id(env)
     video = video.with_suffix(".gif") if gif else video
@@ -161,14 +161,14 @@ def _pictures(env: Any, seconds: float, seed: int, fps: int) -> Iterator[NDArray
 
 
 def identify(out: Path = Path("identified"), members: int = 8) -> None:
-    """Identify the shipped muscle again from the shipped readings (some minutes).
+    """Identify the shipped muscle from the shipped readings (takes a few minutes).
 
     Parameters
     ----------
     out : Path
         Folder for the plant files and the report.
     members : int
-        Number of equally good fits to search for beside the best one.
+        Number of equally good fits to find in addition to the best one.
     """
     from pam_envs.identification.mas10 import identify_all
 
@@ -201,7 +201,7 @@ def diagnose(
     plant : Path
         Plant file of the simulation; default: the shipped muscle, scaled to the rig.
     causes : Path
-        Folder of further causes, one a file (docs/diagnosis_causes.md).
+        Folder of additional causes, one per file (docs/diagnosis_causes.md).
     seed : int
         Seed of all random draws.
     quiet : bool

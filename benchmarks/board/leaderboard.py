@@ -59,9 +59,9 @@ def times_text(all_rows: Sequence[Row]) -> str:
     lines = [
         "# Computation time per step",
         "",
-        "Of `predict` alone for one observation, Python included, as stated by the author of the",
-        "row, not verified: median over the scenarios of the median and of the 99th percentile of",
-        "the first 100 answers in two episodes. Machines and loads differ.",
+        "Time of one call of `predict` for one observation, Python included, as stated by the",
+        "author of the row, not verified. Median and 99th percentile of the first 100 actions",
+        "in two episodes, each as the median over the scenarios. Machines and their load differ.",
         "",
     ]
     columns: Cells = {

@@ -83,11 +83,11 @@ def noticed(rows: Sequence[Row], against: bool) -> str:
         made.append(line)
     return table(head, made) + (
         "\nCounts with exact 95 % intervals. At 0 N the correct answer is *adequate*, no cause. "
-        "Residuals are RMS over the noise, median and range: ours on held-out blocks, sysid's on "
-        "its training data. The issue of sysid with friction at 0 N is that this is at the lower "
-        "bound, which is correct. A residual of ours well above 1 is due to a candidate that "
-        "breaks away slightly early or late and rests elsewhere until the next motion: with the "
-        "rig's own constants it was 0.2 to 2.3 mm off on six rigs at 2 N.\n"
+        "Residuals are RMS errors over the noise, median and range: ours on held-out blocks, those "
+        "of sysid on its training data. At 0 N the issue of sysid with friction is that the "
+        "friction is at its lower bound, which is correct. Our residual is well above 1 if the "
+        "candidate breaks away slightly early or late and rests elsewhere until the next motion: "
+        "with the constants of the rig it was 0.2 to 2.3 mm off on six rigs at 2 N.\n"
     )
 
 
@@ -111,7 +111,7 @@ def parameters(rows: Sequence[Row], against: bool) -> str:
             if against:
                 line.append(rate([_inside(r, key) for r in its]) if "sysid" in key else "")
             made.append(line)
-    note = "\nMedian and range of value over truth, less 1.\n"
+    note = "\nRelative errors (fitted over true value, minus 1): median and range.\n"
     return table(head, made) + note
 
 
@@ -133,7 +133,9 @@ def transfer(rows: Sequence[Row], against: bool) -> str:
             for tool in ("sysid", "sysid_told"):
                 line += [middle([r[tool]["another"] for r in some if tool in r])]
         made.append(line)
-    return table(head, made) + "\nRMS in mm against the noise-free rig, median and range.\n"
+    return (
+        table(head, made) + "\nRMS error in mm relative to the noise-free rig: median and range.\n"
+    )
 
 
 def others(rows: Sequence[Row], against: bool) -> str:
@@ -141,7 +143,7 @@ def others(rows: Sequence[Row], against: bool) -> str:
     effects = list(dict.fromkeys(r["effect"] for r in rows if "friction" not in r["hidden"]))
     if not effects:
         return "None were run.\n"
-    head = ["hidden", "ours: correct name only", "ours: answers", "ours: residual before", "after"]
+    head = ["hidden", "ours: correct name only", "ours: verdicts", "ours: residual before", "after"]
     head += ["sysid: issues", "sysid: residual"] if against else []
     made = []
     for effect in effects:
@@ -154,4 +156,7 @@ def others(rows: Sequence[Row], against: bool) -> str:
             line += [rate([bool(r["sysid"]["issues"]) for r in some])]
             line += [middle([r["sysid"]["residual"] for r in some])]
         made.append(line)
-    return table(head, made) + "\n30 ms of dead time, 3 mm of bias, 6 mm of drift in 60 s.\n"
+    return (
+        table(head, made)
+        + "\nThe effects are 30 ms of dead time, 3 mm of bias, and 6 mm of drift in 60 s.\n"
+    )

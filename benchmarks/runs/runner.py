@@ -60,11 +60,11 @@ class Computing:
     """Processes that compute."""
 
     jobs: int = os.cpu_count() or 1
-    """Processes of this machine; 1 computes in the calling process."""
+    """Number of processes; 1 computes in the calling process."""
     backend: Literal["loky", "dask"] = "loky"
-    """Processes of this machine, or a running Dask cluster."""
+    """Processes on this machine (loky), or a running Dask cluster."""
     address: str = ""
-    """Of the Dask scheduler, like tcp://host:8786."""
+    """Address of the Dask scheduler, for example tcp://host:8786."""
 
     @property
     def cluster(self) -> engine.Cluster:

@@ -19,8 +19,8 @@ from pam_envs.plants.single_muscle.plant import SingleMuscle
 MISSED = (
     "the flat step of the inflating curve from 5 to 5.5 bar at 0 and 2.55 kg",
     "the steep drop of the deflating curve from 3.5 to 3 bar",
-    "the drift of +0.03 mm a repeat at 0 kg",
-    "a width that depends on load other than linearly (three loads do not show it)",
+    "the drift of +0.03 mm per repeat at 0 kg",
+    "a nonlinear dependence of the loop width on load (three loads cannot show it)",
 )
 """Structure of the residuals that the model does not represent."""
 
@@ -72,11 +72,11 @@ def identify_all(
     lines = [
         "# Identification of the MAS-10-N-100 from the tables",
         "",
-        "Made by `pam-envs identify`. Errors in mm over the readings that are not zero by "
-        f"definition; the repeatability floor (a repeat against the mean of the others) is "
+        "Made by `pam-envs identify`. RMS errors in mm, without the readings that are zero by "
+        "definition. The repeatability floor (one repeat against the mean of the others) is "
         f"{floor:.3f} mm.",
         "",
-        "| hysteresis | RMS 0 kg | 2.55 kg | 4.55 kg | all | left-out repeat | widest loops, model "
+        "| hysteresis | RMS 0 kg | 2.55 kg | 4.55 kg | all | held-out repeat | widest loops, model "
         "(measured) | rank | members |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
@@ -102,17 +102,18 @@ def identify_all(
             congruency = (
                 "Preisach's congruency error (minor loops between 2 and 3 bar after 3 and after 6 "
                 f"bar): {inner:.1e} in effective pressure, {outer:.1%} in contraction. For a "
-                "single muscle a Preisach map from pressure straight to contraction is an "
-                "approximation; here the static law comes between."
+                "single muscle a Preisach map from pressure directly to contraction is therefore "
+                "an approximation; this model has the static law in between."
             )
     lines += ["", congruency, "", "## Identifiability of the parameters", ""]
     found = cycles.identifiability(fits[PlayOperator.kind])
     lines += [
-        "Share of each parameter in the combinations that the means determine to better than a "
-        "fifth. A parameter near 0 is assumed (its range is in the plant file) or comes from the "
-        "prior, equal weight on every threshold, which determines the minor loops.",
+        "For `maxwell_slip`: share (0 to 1) of each parameter in the parameter combinations that "
+        "the mean readings determine to better than 20 %. A parameter near 0 is assumed (its range "
+        "is in the plant file) or follows from the prior, equal weight on every threshold, which "
+        "determines the minor loops.",
         "",
-        "| parameter | fixed |",
+        "| parameter | share |",
         "|---|---|",
         *(f"| {n} | {v:.2f} |" for n, v in zip(found.names, found.fixed, strict=True)),
         "",

@@ -66,9 +66,8 @@ def test_page_states_the_torques_and_the_heaviest_links() -> None:
 
 def test_page_command_shows_the_torque_that_is_missing() -> None:
     (command,) = re.findall(r'^python -c "(import gymnasium.*)"$', SECTION, re.MULTILINE)
-    words = re.search(
-        r"needs ([\d.]+ N m) at (\S+) degrees, where the muscles give ([\d.]+)", SECTION
-    )
+    needed = r"needs ([\d.]+ N m) at (\S+) degrees, where the muscles give ([\d.]+)"
+    words = re.search(needed, " ".join(SECTION.split()))
     assert words
     expected = f"needs {words[1]} at {words[2]} degrees and its muscles exert {words[3]} N m"
     with pytest.raises(UnbearableLoad, match=expected):
@@ -83,7 +82,7 @@ def test_heavy_arm_bears_the_paths_and_the_light_muscles_do_not(page: dict[str, 
     with pytest.raises(UnbearableLoad):
         gym.make(ID, plant=RedundantManipulator.paper(chain=heavy.chain), reference="path_1")
     heaviest_links = min(heaviest(heavy, plan) for plan in plans(heavy).values())
-    assert f"up to {heaviest_links:.1f} kg a joint" in SECTION
+    assert f"up to {heaviest_links:.1f} kg per joint" in SECTION
 
 
 def test_heavy_arm_rests_at_the_ends_of_the_paths(page: dict[str, Any]) -> None:
@@ -99,9 +98,8 @@ def test_heavy_arm_rests_at_the_ends_of_the_paths(page: dict[str, Any]) -> None:
 @slow
 @pytest.mark.parametrize("path", ["path_1", "path_2", "path_3"])
 def test_heavy_arm_follows_the_paths(page: dict[str, Any], path: str) -> None:
-    (name, bound) = re.findall(r"^`(joint_\w+)` follows .* below (\d+) mm", SECTION, re.MULTILINE)[
-        0
-    ]
+    text = " ".join(SECTION.split())
+    ((name, bound),) = re.findall(r"`(joint_\w+)` follows them .*? below (\d+) mm", text)
     env = gym.make(ID, plant=page["heavy"], reference=path).unwrapped
     controller = make_controller(name, env.plant, env.signals, env.action_signals, 0)  # type: ignore[attr-defined]
     episode = run(env, controller, 0)
@@ -113,8 +111,8 @@ def test_heavy_arm_follows_the_paths(page: dict[str, Any], path: str) -> None:
 @slow
 def test_ripple_after_a_step_is_that_of_the_page(page: dict[str, Any]) -> None:
     bare = RedundantManipulator.paper("none")
-    arms = {"0.1 kg a joint |": page["light"], "1 kg a joint": page["heavy"]}
-    for line, plant in (arms | {"0.1 kg a joint, muscles without": bare}).items():
+    arms = {"0.1 kg per joint |": page["light"], "1 kg per joint": page["heavy"]}
+    for line, plant in (arms | {"0.1 kg per joint, muscles without": bare}).items():
         stated = numbers(line)
         made = [page["ripple"](plant, share) for share in (0.0, 0.25, 1.0)]
         assert made == pytest.approx(stated, abs=0.02)

@@ -60,7 +60,10 @@ MISSED = {
         "{:.1f} points",
     ),
     "sine, 1 ms: error of the PI less that of model-following": None,
-    "2 deg off rejected to 10 %, joint_mfc_mu": ("2 degrees off rejected to 10 %, MFC", "{:.2f} s"),
+    "2 deg off rejected to 10 %, joint_mfc_mu": (
+        "disturbance of 2 degrees rejected to 10 %, MFC",
+        "{:.2f} s",
+    ),
     "10 deg, rise, joint_mfc_mu_plain": ("rise without inverse", "{:.3f} s"),
 }
 """Figures that do not reproduce, besides ratios; their lines in the page's last table, and how they

@@ -32,7 +32,7 @@ GIVEN = {
     "hysteresis.creep_time_2": "the plant",
     "hysteresis.creep_time_3": "the plant",
     "hysteresis.creep_time_4": "the plant",
-    "hysteresis.friction": "the plant; of friction driven by length, which no cause is judged on",
+    "hysteresis.friction": "the plant; no cause uses it (friction driven by length)",
     "hysteresis.limit_per_pressure": "the plant, as `hysteresis.friction`",
     "hysteresis.limit_per_load": "the plant, as `hysteresis.friction`",
     "mass.load": "the recording, `load_N`; its error is `payload_error`",

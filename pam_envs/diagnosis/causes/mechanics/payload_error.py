@@ -11,11 +11,13 @@ CAUSE = Cause(
     name="payload_error",
     title="an error of the payload",
     forms=(Form("tray", (Term("mass.load_error", (0.1, -0.1), scale=0.05),)),),
-    signature="the error of one further weight at every load alike; segments without a load fit",
+    signature=(
+        "the error of one additional weight, equal at every load; segments without a load fit"
+    ),
     neighbours=("load_dependent_compliance",),
     experiment=(
-        "The same slow triangle under five loads, one of them none: a tray shifts all loads by one "
-        "weight and not the empty hook, compliance grows with the load. Or weigh the load."
+        "The same slow triangle under five loads, one of them none: a tray adds one weight to all "
+        "loads but not to the empty hook, compliance grows with the load. Or weigh the load."
     ),
     source="Assumed: trays and hooks of rigs weigh up to a few hundred grams.",
     needs=("contraction", "loads", "weighed"),

@@ -1,8 +1,8 @@
 """Length-driven friction: strands slide when the length changes, not the pressure.
 
-Threads of the braid slide on one another as the muscle contracts. A hysteresis of the pressure lets
-them slide in a blocked muscle too, where they are at rest. The plant has four Maxwell elements in
-the length, which break away one after the other and act against the motion.
+Threads of the braid slide on one another as the muscle contracts. In a hysteresis of the pressure
+they slide even in a blocked muscle, where they are in fact at rest. The plant has four Maxwell
+elements in the length, which break away one after the other and act against the motion.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
@@ -31,9 +31,9 @@ CAUSE = Cause(
         "viscous_loss",
     ),
     experiment=(
-        "Ramp the pressure at a blocked length and under a constant load: friction that length "
-        "drives vanishes in the first. Without a clamp, small triangles at two pressures and two "
-        "loads."
+        "Ramp the pressure at a blocked length and under a constant load: friction driven by "
+        "length vanishes at the blocked length. Without a clamp: small triangles at two pressures "
+        "and two loads."
     ),
     source=(
         "Public isometric pulse tests of 10 and 20 mm Festo muscles: hardly any loop at full "

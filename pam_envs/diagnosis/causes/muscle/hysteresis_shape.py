@@ -2,8 +2,8 @@
 
 A hysteresis of play operators relates minor loops to the major one (congruence), and thresholds
 that fit the major loop may be wrong for small reversals, since strands that have slid far settle
-differently from those that have just reversed. The plant weakens or strengthens friction below its
-largest value by the difference to that value.
+differently from those that have just reversed. In the plant, friction below its largest value is
+scaled down or up with the distance from that value.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
@@ -16,8 +16,8 @@ CAUSE = Cause(
     neighbours=("hysteresis_drive", "pressure_dependent_friction", "stick_slip"),
     experiment=(
         "Small triangles about half the pressure after a full cycle, once more after a small one, "
-        "and again at another pressure: the shape depends on the distance from the reversal alone, "
-        "friction that goes with pressure on the level."
+        "and again at another pressure: the effect of the shape depends only on the distance from "
+        "the reversal, that of pressure-dependent friction on the pressure level."
     ),
     source=(
         "A public record of a DMSP-10-250: plays that fit the major loop to 0.6 % miss random "
@@ -25,6 +25,6 @@ CAUSE = Cause(
     ),
     needs=("contraction",),
     settled="whole cycles hold no minor loops",
-    sensor="a load cell at a blocked length, for the part that length does not drive",
+    sensor="a load cell at a blocked length, for the part that is not driven by length",
     compensable=True,
 )

@@ -22,18 +22,18 @@ CAUSE = Cause(
         ),
     ),
     signature=(
-        "a smooth function of pressure that differs between loads, without direction or time; with "
-        "the base refitted, of opposite signs at the middle load and at the outer ones"
+        "a smooth function of pressure that differs between loads, independent of direction and "
+        "time; with the base refitted, of opposite signs at the middle load and at the outer ones"
     ),
     neighbours=("payload_error", "load_dependent_hysteresis", "wire_slack", "temperature"),
     experiment=(
         "The same slow triangle under five loads, one of them none: a wrong load shifts all loads "
-        "by one amount, slack ends at a contraction, compliance bends with the load. Three loads "
-        "cannot separate a square law from a dead zone."
+        "by one amount, slack ends at a certain contraction, the effect of compliance is "
+        "nonlinear in the load. Three loads cannot separate a square law from a dead zone."
     ),
     source=(
-        "positioning2021, Tables 3 to 5: the load enters as a shift of the pressure, 0.079 bar a "
-        "kilogram, growing faster than in proportion."
+        "positioning2021, Tables 3 to 5: the load enters as a shift of the pressure, 0.079 bar "
+        "per kilogram, growing faster than in proportion."
     ),
     needs=("contraction", "loads"),
     sensor="a load cell between muscle and load",

@@ -14,7 +14,7 @@ CAUSE = Cause(
     neighbours=("load_dependent_compliance", "pressure_dependent_friction", "hysteresis_drive"),
     experiment=(
         "The same slow triangle under five loads: a changing width opens or closes the loop about "
-        "its middle line, a changing compliance moves that line, which masks the first until "
+        "its middle line, a changing compliance moves that line and masks the width until it is "
         "modelled."
     ),
     source="positioning2021, Tables 3 to 5: loops of 3.3, 2.8, 2.4 mm at 0, 2.55, 4.55 kg.",

@@ -1,7 +1,7 @@
 """Pressure-dependent friction: the loop is wider at one end of the pressure range.
 
-The pressure presses the threads of the braid on one another, so that their friction grows with it,
-less the effect of the load. In the plant the hysteresis acts on a stretched pressure scale with
+The pressure, reduced by the effect of the load, presses the threads of the braid together, so that
+their friction grows with it. In the plant the hysteresis acts on a stretched pressure scale with
 uniform friction, so that the width of the loop changes along the range.
 """
 
@@ -23,12 +23,14 @@ CAUSE = Cause(
     signature="the sign of the direction at low pressures and the opposite one at high pressures",
     neighbours=("hysteresis_drive", "hysteresis_shape", "load_dependent_hysteresis", "sensor_bias"),
     experiment=(
-        "Small loops of the same size at three mean pressures, under two loads: with pressure the "
-        "width changes at either load, with load at every pressure, a wrong shape changes neither."
+        "Small loops of the same size at three mean pressures, under two loads: "
+        "pressure-dependent friction changes the width with pressure at either load, "
+        "load-dependent friction with load at every pressure, a wrong shape of minor loops "
+        "changes neither."
     ),
     source=(
-        "tondu2000: friction between threads goes with the force between them; an open wrist-robot "
-        "project: 0.5 N and 15 N/MPa; least squares on positioning2021."
+        "tondu2000: friction between threads is proportional to the force between them; an open "
+        "wrist-robot project: 0.5 N and 15 N/MPa; least squares on positioning2021."
     ),
     needs=("contraction",),
     sensor="a load cell between muscle and load",

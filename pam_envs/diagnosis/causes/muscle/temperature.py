@@ -1,8 +1,8 @@
 """Temperature: the force of the muscle depends on its temperature.
 
-The stiffness of rubber is proportional to absolute temperature, its losses and the braid's friction
-decrease with it, and cycling heats the muscle. The effective pressure changes by a fixed share per
-kelvin away from 20 degrees Celsius.
+The stiffness of rubber is proportional to absolute temperature, its losses and the friction of the
+braid decrease with temperature, and cycling heats the muscle. The effective pressure changes by a
+fixed share per kelvin away from 20 degrees Celsius.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term

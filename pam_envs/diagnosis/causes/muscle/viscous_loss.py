@@ -1,7 +1,7 @@
 """Viscous loss: a drag that grows less than in proportion to speed.
 
 Rubber under shear and grease between strands resist motion with a power of the speed below one. The
-plant has a further damping that decreases with speed from its value at rest, so that it acts on
+plant has an additional damping that decreases with speed from its value at rest, so that it acts on
 slow motion and leaves fast motion to the damping of the base.
 """
 
@@ -22,8 +22,9 @@ CAUSE = Cause(
     signature="an error with the sign of the velocity that grows with speed and vanishes in a hold",
     neighbours=("stick_slip", "hysteresis_drive", "sensor_delay", "creep", "resonance"),
     experiment=(
-        "A sine at 0.2, 0.5, 1 and 2 Hz, and ramps at two rates: what viscous loss adds to the "
-        "loop shrinks with the rate, what friction adds does not; in a hold only friction is left."
+        "A sine at 0.2, 0.5, 1 and 2 Hz, and ramps at two rates: the part of the loop due to "
+        "viscous loss shrinks as the rate decreases, the part due to friction does not; in a hold "
+        "only friction is left."
     ),
     source="reynolds2003: a large muscle, less damped in relaxation; other sizes are assumed.",
     needs=("contraction",),

@@ -20,8 +20,8 @@ CAUSE = Cause(
         "resonance",
     ),
     experiment=(
-        "Steps of three sizes, up and down: dead time is the same for all of them, the time of a "
-        "limited rate grows with the size, a slow exhaust is late only downwards. A delayed "
+        "Steps of three sizes, up and down: dead time is the same for all of them, the delay of a "
+        "rate limit grows with the size, a slow exhaust is late only downwards. A delayed "
         "position reading does not affect the pressure."
     ),
     source=(

@@ -23,11 +23,13 @@ CAUSE = Cause(
             (Term("regulator.exhaust_rate", (1.5, 5.0), low=0.2, high=99.0, log=True),),
         ),
     ),
-    signature="downward steps are late or early in the pressure, upward ones the other way or not",
+    signature=(
+        "downward steps are late or early in the pressure, upward ones the opposite or neither"
+    ),
     neighbours=("dead_time", "slew_limit", "supply_droop", "creep"),
     experiment=(
         "Steps of several sizes up and down between the same levels, against the measured "
-        "pressure: dead time and a limited rate act in both directions, a drooping supply "
+        "pressure: dead time and a rate limit act in both directions, a drooping supply only "
         "upwards, creep not in the pressure."
     ),
     source=(

@@ -37,9 +37,9 @@ CAUSE = Cause(
     signature="settled pressures miss the command by one amount, with the sign of the last step",
     neighbours=("leak", "dead_time", "stick_slip", "threshold_pressure"),
     experiment=(
-        "Sines of the command at 1 Hz with decreasing amplitudes and approach one level from both "
-        "sides: the dead band shows in the measured pressure, stick-slip and a threshold only in "
-        "the contraction, dead time at any amplitude alike."
+        "Sines of the command at 1 Hz with decreasing amplitudes, and an approach to one level "
+        "from both sides: the dead band shows in the measured pressure, stick-slip and a "
+        "threshold only in the contraction, dead time equally at any amplitude."
     ),
     source=(
         "An open wrist-robot project's identified ITV regulator: overlap of 16 to 24 kPa, gain "

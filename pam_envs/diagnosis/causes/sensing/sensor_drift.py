@@ -46,7 +46,7 @@ CAUSE = Cause(
         "Return to rest without pressure at the end: a drift has moved the zero, heat "
         "and softening have not; after a rest creep and softening restart, a drift continues."
     ),
-    source="Assumed; readings of positioning2021, Table 3, rise by 0.03 mm a repeat unloaded.",
+    source="Assumed; readings of positioning2021, Table 3, rise by 0.03 mm per repeat unloaded.",
     sensor="a second position sensor of another kind",
     # not compensable: the loop follows the reading
 )

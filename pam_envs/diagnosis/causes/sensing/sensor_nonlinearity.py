@@ -2,7 +2,7 @@
 
 Potentiometers, draw-wire sensors and bridges follow their calibration line at the ends and deviate
 between them. The error is a parabola that vanishes at zero and at full scale. It is not separable
-from a static law of the same bend, unless that law acts at several loads.
+from a static law of the same curvature, unless that law acts at several loads.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
