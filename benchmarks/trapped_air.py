@@ -83,5 +83,7 @@ def trapped_air_figure() -> Any:
         ax.spines[["top", "right"]].set_visible(False)
         ax.legend(frameon=False, fontsize=8)
     panels[0].set_ylabel("gauge pressure [kPa]")
-    figure.suptitle("Trapped air of an antagonistic pair, both valves shut")
+    figure.suptitle(
+        "Trapped air of an antagonistic pair, valves shut; slopes of the log of absolute pressure"
+    )
     return figure

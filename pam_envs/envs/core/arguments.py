@@ -224,7 +224,8 @@ class Common:
                 plant.replace({name: end})  # refuses values out of bounds and unstable plants
             table.append((names.index(name), low, high))
         worst = {name: min(ranges[name]) for name in which.lowest if name in ranges}
-        worst |= {name: max(ranges[name]) for name in which.highest if name in ranges}
+        highest = (*which.highest, "regulator.polytropic")
+        worst |= {name: max(ranges[name]) for name in highest if name in ranges}
         for member in plant.members() if ranges else ():
             member.replace(worst)  # refuses a corner that the sub-steps cannot follow
         return np.array(table, float).reshape(-1, 3)
