@@ -47,7 +47,7 @@ def trapped_air(exponent: float) -> tuple[Array, Array]:
     valve = np.where(time < REST * joint.control_period, 1.0, -1.0)
     pull = np.where(valve < 0.0, PULL * np.sin(2.0 * np.pi * time), 0.0)
     held = [np.where(valve > 0.0, p.mean(), -1.0) for p in record.pressures]
-    made = simulate_joint(joint, disturbance=pull, pressures=(held[0], held[1]))
+    made = simulate_joint(joint, disturbance=pull, pressures=(held[0], held[1]), compiled=False)
     shortened = MUSCLE_LENGTH * (made["contraction_a"] - made["contraction_b"]) / 2.0
     pressures = np.array([made["pressure_a"], made["pressure_b"]])
     settled = REST + 10  # the dead time is over

@@ -1,6 +1,6 @@
 """Air in a muscle behind the orifices of its regulator: flow, compression by motion, stiffness.
 
-A sub-step is one of three parts: the air moves to the volume of the predicted middle, at which the
+A sub-step has three parts: the air moves to the volume of the predicted middle, at which the
 valve lets air through (explicit midpoint rule); the muscle moves, with the air's stiffness beside
 that of the law; the air moves to the volume that the motion has reached. Motion keeps
 ``p_abs V^n``, so that without flow and leak the air is conserved exactly.

@@ -75,7 +75,8 @@ def joint(plant: AntagonisticJoint) -> Pair:
 
 def arm(plant: RedundantManipulator) -> Pair:
     commands = np.zeros((BEFORE + AFTER, plant.stages))
-    shaken = simulate_manipulator(plant, commands, disturbance=swing(1.0)[:, None] * np.ones(6))
+    torques = swing(1.0)[:, None] * np.ones(plant.stages)
+    shaken = simulate_manipulator(plant, commands, disturbance=torques, compiled=False)
     return shaken["pressure"], plant.muscle.volume_at(shaken["contraction"])
 
 
@@ -245,12 +246,13 @@ def travelled(name: str, substeps: int) -> Any:
         made = lift(plant, command, 1.0)
         return np.array([made["pressure"] / 1e5, made["contraction"] / 1e-3])
     if name == "knee_orthosis":
-        made = simulate_knee(plant, command, pressure=1e5)
+        made = simulate_knee(plant, command, pressure=1e5, compiled=False)
         return np.array([made["pressure"] / 1e5, made["angle"] / 0.1])
     if name == "elbow_orthosis":
-        made = simulate_elbow(plant, np.stack([np.full(70, 1e5), command], axis=1))
+        commands = np.stack([np.full(70, 1e5), command], axis=1)
+        made = simulate_elbow(plant, commands, compiled=False)
         return np.array([made["pressure_b"] / 1e5, made["angle"] / 0.1])
-    made = simulate_joint(plant, pressures=(command, np.full(70, 2e5)))
+    made = simulate_joint(plant, pressures=(command, np.full(70, 2e5)), compiled=False)
     return np.array([made["pressure_a"] / 1e5, made["angle"] / 0.1])
 
 

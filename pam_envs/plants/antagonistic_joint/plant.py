@@ -79,8 +79,12 @@ class AntagonisticJoint(PairPlant, rows=K):
     @property
     def flowless(self) -> str:
         """Reason why this variant has no flow through a regulator's orifices, and the remedy."""
-        moves = "dynamics = 'reduced' moves by its commands, without air: take dynamics = 'muscles'"
-        return moves if self.dynamics == "reduced" else ""
+        return (
+            "dynamics = 'reduced' moves by its commands, without air; take dynamics = 'muscles' or "
+            "air = 'regulator'"
+            if self.dynamics == "reduced"
+            else ""
+        )
 
     def _check(self) -> None:
         """Refuse angles out of reach, and a motion that the sub-steps cannot follow."""

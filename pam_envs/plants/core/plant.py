@@ -178,7 +178,7 @@ class Plant:
                 f"{SWITCH} = {flow:g} must be 0 (air = 'regulator') or 1 (air = 'flow')"
             )
         if flow and self.flowless:
-            raise ValueError(f"air = 'flow' ({SWITCH} = 1): {self.flowless}; or take 'regulator'")
+            raise ValueError(f"air = 'flow' ({SWITCH} = 1): {self.flowless}")
 
     def _usage(self) -> Usage:
         """Return the demands on the hysteresis operator."""

@@ -93,7 +93,7 @@ class ElbowOrthosis(Plant, rows=K):
     @property
     def flowless(self) -> str:
         """Reason why this variant has no flow through a regulator's orifices, and the remedy."""
-        own = "valves = 'on_off' have a flow of their own: leave regulator.flow at 0"
+        own = "valves = 'on_off' have a flow of their own; leave regulator.flow at 0"
         return own if self.valves == "on_off" else ""
 
     def with_air(self, air: str) -> Self:

@@ -68,7 +68,7 @@ def squeeze_muscle(rows: Any, fixed: Any, share: float) -> None:
     for j in range(LANES):
         effective[j] = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective[j])
         gain = fixed[K.MUSCLE_GAIN][j] * fixed[K.MUSCLE_STIFFNESS_RATIO][j]
-        stiffness[j] = max(0.0, stiffness[j] + gain * (effective[j] - was[0][j]))
+        stiffness[j] = stiffness[j] + gain * (effective[j] - was[0][j])
 
 
 @kernel

@@ -145,8 +145,12 @@ class KneeOrthosis(Plant, rows=K):
     @property
     def flowless(self) -> str:
         """Reason why this variant has no flow through a regulator's orifices, and the remedy."""
-        taken = "dynamics = 'measured' is the response of regulator and muscle together: take 'lag'"
-        return taken if self.dynamics == "measured" else ""
+        return (
+            "dynamics = 'measured' is the response of regulator and muscle together; take "
+            "dynamics = 'lag' or air = 'regulator'"
+            if self.dynamics == "measured"
+            else ""
+        )
 
     def _check(self) -> None:
         """Refuse too fast a motion, and a strap with which the wire opens past its toggle."""

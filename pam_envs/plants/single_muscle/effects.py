@@ -152,9 +152,7 @@ def squeeze_muscle(rows: Any, fixed: Any, share: float, own: Any) -> None:
     drive = rows[R.DRIVE]
     squeeze(rows, fixed, EFFECTS_AT + S.air, R.EFFECT.regulator, rows[R.PRESSURE], own, share)
     for j in range(LANES):
-        was = drive[j]
-        drive[j] = max(0.0, was + own[j])
-        own[j] = drive[j] - was
+        drive[j] = drive[j] + own[j]
 
 
 @kernel
