@@ -103,8 +103,8 @@ def flow_step(
 
     The setpoint [Pa] is ``older`` and then, for the share ``late``, ``newer``; below zero the valve
     is shut. A muscle is not filled past its setpoint or the source, nor emptied below the
-    atmosphere. ``own`` is two rows of scratch that receive the regulated pressures and those before
-    the line; ``valve`` and ``lines`` are as of :func:`~pam_envs.pneumatics.regulator.air_step`.
+    atmosphere. ``own`` is two rows of scratch that receive the pressures before, at the regulator
+    and behind the line; ``valve`` and ``lines`` are those of ``regulator.air_step``.
     """
     regulated, space, drop = (
         rows[state + AIR_STATE.regulated],

@@ -29,8 +29,9 @@ SWITCH = "regulator.flow"
 class FlowEffects:
     """Orifices of a regulator and the air behind them.
 
-    With ``flow`` 1 they replace time constant, rate limit and the effects of the exhaust. Dead
-    time, gain, dead band, supply, leak and line keep their effects.
+    With ``flow`` 1 they replace time constant, rate limit, overlap, the effects of the exhaust and
+    the supply's filling time. Dead time, gain, dead band, pressure and droop of the supply, leak
+    and line keep their effects.
     """
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
