@@ -17,6 +17,7 @@ from benchmarks.effort import pareto_figure  # noqa: E402
 from benchmarks.energy import isobaric_figure  # noqa: E402
 from benchmarks.papers import elbow as papers_elbow  # noqa: E402
 from benchmarks.papers import knee_studies, plots  # noqa: E402
+from benchmarks.trapped_air import trapped_air_figure  # noqa: E402
 
 
 def save(env: gym.Env, path: Path) -> None:
@@ -86,3 +87,4 @@ if __name__ == "__main__":
     isobaric_figure().savefig(images / "isobaric_loops.png", dpi=90)
     pareto_figure().savefig(images / "effort_pareto.png", dpi=100)
     plots.step_figure().savefig(images / "joint_step.png", dpi=100)
+    trapped_air_figure().savefig(images / "trapped_air.png", dpi=100)

@@ -28,7 +28,7 @@ from baselines.core.entry import Bounds, Spec
 from baselines.elbow.nominal import ELBOW_ENTRY, ElbowSignalMap, ElbowView, make_elbow_signal_map
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-from pam_envs.pneumatics.on_off_pair import mass_flow
+from pam_envs.pneumatics.flow import mass_flow
 
 LOOP_PERIODS = 2.0
 """Control periods of the loop around a regulator; fewer would amplify sensor noise."""

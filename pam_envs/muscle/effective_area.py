@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -77,6 +77,11 @@ class EffectiveAreaMuscle(
         """Return the effective area [m2] at a strain."""
         e = np.asarray(strain, float)
         return np.asarray(self.area * (1.0 - self.area_taper * e - self.area_curve * e**2))
+
+    def volume_at(self, strain: ArrayLike) -> NDArray[np.float64]:
+        """Return the inner volume [m3] at a strain."""
+        laws: Any = (self.rest_length, self.diameter, self.area, self.area_taper, self.area_curve)
+        return np.asarray(volume(np.asarray(strain, float), *laws))  # type: ignore[arg-type]
 
     def passive(self, strain: ArrayLike) -> NDArray[np.float64]:
         """Return the force [N] with which tube and braid resist contraction."""

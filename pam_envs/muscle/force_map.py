@@ -87,6 +87,12 @@ class ForceMap(TemperatureEffects):
         """Return the force over pressure [m2] at a contraction [1]."""
         return np.asarray(self.area * (1.0 - self.taper * self._measured(contraction)))
 
+    def volume_at(self, contraction: ArrayLike) -> NDArray[np.float64]:
+        """Return the inner volume [m3] at a contraction [1]."""
+        bore, e = 0.25 * np.pi * self.diameter**2, np.asarray(contraction, float)
+        shape = (self.area, self.taper, 1.0 / self.stretch, bore, self.rest_length)
+        return np.asarray(inner_volume(e, *shape))  # type: ignore[arg-type]
+
     def passive(self, contraction: ArrayLike) -> NDArray[np.float64]:
         """Return the force [N] that opposes the pressure at a contraction [1]."""
         e = self._measured(contraction)

@@ -43,6 +43,11 @@ class GasSpring(TemperatureEffects):
         stretch = np.maximum(0.0, np.asarray(length) - self.shortest_length)
         return np.asarray(np.maximum(0.0, stiffness) * stretch)
 
+    def volume_at(self, length: ArrayLike) -> NDArray[np.float64]:
+        """Return the inner volume [m3] at a length [m]."""
+        shape = (self.shortest_length, self.stiffness_ratio, self.full_volume)
+        return np.asarray(gas_volume(np.asarray(length, float), *shape))  # type: ignore[arg-type]
+
     def stiffness(self, tension: ArrayLike, length: ArrayLike) -> NDArray[np.float64]:
         """Return the stiffness ``T / dL`` [N/m] that gives a tension [N] at a length [m].
 

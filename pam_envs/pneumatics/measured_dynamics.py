@@ -13,11 +13,12 @@ the setpoint itself.
 from __future__ import annotations
 
 import cmath
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 from pam_envs.kernels.arithmetic import decay, sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed, published
+from pam_envs.pneumatics.flow import usual_conductance
 from pam_envs.pneumatics.regulator import RegulatorEffects, usual_dead_time, usual_slew_rate
 
 NUMERATOR = ((1.0, 17.45, 75.79), (1.0, 7.39, 13.41))
@@ -47,6 +48,8 @@ class OrthosisRegulator(RegulatorEffects):
         spread=(0.035, 0.1),
     )
     slew_rate: float = usual_slew_rate()
+    _: KW_ONLY
+    conductance: float = usual_conductance(1e-9, "fills 0.11 l of the orthosis' muscle at 7 bar/s")
 
 
 def roots(factor: tuple[float, float, float]) -> tuple[complex, ...]:

@@ -3,22 +3,18 @@
 The coil of a valve is switched on for a pulse at the start of a cycle. A valve opens when its coil
 has been on for ``opening_time`` and closes when it has been off for ``closing_time``: a pulse of
 width ``w`` opens it for ``w - opening_time + closing_time``, and one shorter than ``opening_time``
-not at all. The flow of an open valve follows ISO 6358,
-
-    m' = C rho_0 p_1 f(p_2 / p_1),    f(x) = 1 for x <= b,  sqrt(1 - ((x - b) / (1 - b))^2) above
-
-with absolute pressures, upstream first, at 20 degrees C: choked up to the critical ratio ``b``. The
-air in the bundle stays at that temperature. A check valve keeps it out of the supply.
+not at all. The flow of an open valve follows ISO 6358 (:mod:`pam_envs.pneumatics.flow`). The air in
+the bundle stays at 20 degrees C. A check valve keeps it out of the supply.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from pam_envs.constants import ATMOSPHERE, REFERENCE_DENSITY
+from pam_envs.constants import ATMOSPHERE
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed, derived, published
+from pam_envs.pneumatics.flow import mass_flow
 
 _MAKER = (
     "maker's data sheet of the V100 series, standard V114, the valve that chakarov2018 names in "
@@ -78,19 +74,6 @@ def coil_window(
         duration = duration + min(off, fall)
     stays = is_open and (off <= 0.0 or off < fall)
     return duration, left - on, max(0.0, lift - off / closing), 1.0 if stays else 0.0
-
-
-@kernel
-def mass_flow(upstream: float, downstream: float, conductance: float, critical: float) -> float:
-    """Return the flow [kg/s] between absolute pressures [Pa], ISO 6358; never backwards."""
-    ratio = downstream / upstream
-    if ratio >= 1.0:
-        return 0.0
-    choked = conductance * REFERENCE_DENSITY * upstream
-    if ratio <= critical:
-        return choked
-    part = (ratio - critical) / (1.0 - critical)
-    return choked * math.sqrt(1.0 - part * part)
 
 
 @kernel

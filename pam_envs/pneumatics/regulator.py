@@ -9,7 +9,7 @@ valve that closes, overlap of a spool, slower and choked exhaust, leak.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
 from pam_envs.constants import ATMOSPHERE
@@ -18,6 +18,7 @@ from pam_envs.kernels.build import LANES, kernel
 from pam_envs.kernels.history import note, noted
 from pam_envs.kernels.motion import resonator_step
 from pam_envs.parameters import assumed, derived, effect, named_rows, parameter_rows, published
+from pam_envs.pneumatics.flow import FlowEffects, usual_conductance
 
 AMPLE = 2e7
 """Supply pressure [Pa] that limits nothing."""
@@ -129,8 +130,8 @@ class ValveEffects:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RegulatorEffects(LineEffects, SupplyEffects, ValveEffects):
-    """Effects of a regulator with its supply and its line."""
+class RegulatorEffects(FlowEffects, LineEffects, SupplyEffects, ValveEffects):
+    """Effects of a regulator with its supply, its line and its orifices."""
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
         ("gain",),
@@ -142,6 +143,7 @@ class RegulatorEffects(LineEffects, SupplyEffects, ValveEffects):
         ("leak",),
         ("supply_pressure", "supply_droop", "supply_time", "supply_recovery"),
         ("ring_share", "ring_flow", "ring_frequency", "ring_damping"),
+        *FlowEffects.effects,
     )
 
 
@@ -194,6 +196,8 @@ class JointRegulator(RegulatorEffects):
         spread=(0.03, 0.06),
     )
     slew_rate: float = usual_slew_rate()
+    _: KW_ONLY
+    conductance: float = usual_conductance(2.3e-10, "fills 25 ml of a DMSP-10-150N at 7 bar/s")
 
 
 @dataclass(frozen=True)
@@ -208,12 +212,20 @@ class BundleRegulator(RegulatorEffects):
     slew_rate: float = assumed(
         1.5e6, "Pa/s", 1e4, 1e9, "200 l/min into seven muscles", neutral=1e9, spread=(0.8e6, 3e6)
     )
+    _: KW_ONLY
+    conductance: float = usual_conductance(4.7e-9, "fills 0.24 l of seven muscles at 15 bar/s")
 
 
 AIR = parameter_rows(RegulatorEffects)
 """Rows of the effects of valve, supply and line, from the first."""
-AIR_STATE = named_rows("regulated", "opened", "drop", "line", "line_rate")
-"""Rows of the state of valve, supply and line, from the first."""
+AIR_STATE = named_rows(
+    *("regulated", "opened", "drop", "line", "line_rate"),
+    *("space", "here", "gives", "ahead", "slope"),
+)
+"""Rows of the state of valve, supply and line, from the first; then those of the air in the muscle:
+volume of its pressure [m3] (0 before the first sub-step), volume at the present position, change of
+the volume with the displacement, predicted displacement to the middle of a sub-step, and rise of
+the pressure with the displacement (:mod:`pam_envs.pneumatics.enclosed_air`)."""
 
 
 @kernel
@@ -377,7 +389,8 @@ def begin_air(rows: Any, j: int, state: int, pressure: float) -> None:
     """Begin valve, supply and line of one lane at rest at a pressure [Pa]."""
     rows[state + AIR_STATE.regulated][j] = rows[state + AIR_STATE.line][j] = pressure
     rows[state + AIR_STATE.opened][j] = rows[state + AIR_STATE.drop][j] = 0.0
-    rows[state + AIR_STATE.line_rate][j] = 0.0
+    rows[state + AIR_STATE.line_rate][j] = rows[state + AIR_STATE.space][j] = 0.0
+    rows[state + AIR_STATE.ahead][j] = rows[state + AIR_STATE.slope][j] = 0.0
 
 
 @kernel

@@ -22,6 +22,7 @@ IDS = sorted(name for name in gym.registry if name.startswith("PAM/"))
 COMMON: dict[str, dict[str, Any]] = {
     "default": {},
     "random": {"randomize": True, "preview": 2, "preview_stride": 7},
+    "flow": {"air": "flow"},
 }
 """Arguments that every environment takes."""
 

@@ -15,7 +15,8 @@ from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
 from pam_envs.plants.elbow_orthosis.rollout import (
     simulate_elbow,
 )
-from pam_envs.pneumatics.on_off_pair import OnOffValve, mass_flow
+from pam_envs.pneumatics.flow import mass_flow
+from pam_envs.pneumatics.on_off_pair import OnOffValve
 
 slow = pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
 PERIOD = ElbowOrthosis.control_period

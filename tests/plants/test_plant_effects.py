@@ -23,6 +23,7 @@ from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rollout import simulate
+from pam_envs.pneumatics.flow import SWITCH
 
 Signals = dict[str, Any]
 PERIOD = 0.01
@@ -254,7 +255,8 @@ def test_neutral_values_leave_the_plant_plain(name: str) -> None:
         part, _, field = effect.partition(".")
         declared = declarations(getattr(plant, part))[field]
         end = declared.high if declared.high > neutral else declared.low
-        other = plant.replace({effect: neutral + 0.1 * (end - neutral)})
+        share = 1.0 if effect == SWITCH else 0.1
+        other = plant.replace({effect: neutral + share * (end - neutral)})
         assert other.extended and other.digest() != plant.digest(), effect
 
 

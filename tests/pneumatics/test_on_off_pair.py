@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY, REFERENCE_DENSITY
-from pam_envs.pneumatics.on_off_pair import OnOffValve, coil_window, emptied, filled, mass_flow
+from pam_envs.pneumatics.flow import mass_flow
+from pam_envs.pneumatics.on_off_pair import OnOffValve, coil_window, emptied, filled
 
 VALVE = OnOffValve()
 SUPPLY = VALVE.supply_pressure + ATMOSPHERE

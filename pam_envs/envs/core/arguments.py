@@ -21,6 +21,7 @@ from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.hysteresis.protocol import DRIVES, kind_of, kinds, model_of
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core.everyday import everyday
+from pam_envs.pneumatics.flow import AIRS, SWITCH
 from pam_envs.wording import near
 
 T = TypeVar("T")
@@ -54,6 +55,9 @@ class Common:
     hysteresis_drive : {"length", "pressure"}, optional
         Input of the hysteresis: friction driven by length is passive, the papers' forms create
         energy. Default: that of ``plant``; else "length", for the knee "pressure".
+    air : {"regulator", "flow"}, optional
+        Air of the muscles: behind closed-loop regulators, or flowing through their orifices into
+        the muscles' volumes (ISO 6358). Default: that of ``plant``, or "regulator".
     plant : plant or path, optional
         Plant of the environment's family, as an object or a YAML file. Default: the published one.
     reference : str or array_like
@@ -83,6 +87,7 @@ class Common:
     episode_seconds: float
     hysteresis: str | None = None
     hysteresis_drive: str | None = None
+    air: str | None = None
     plant: Any = None
     randomize: Any = False
     normalize: bool = True
@@ -98,11 +103,18 @@ class Common:
         check_number("episode_seconds", self.episode_seconds, 0.02, 3600.0, "s")
 
     def plant_of(self, kind: type[T], default: Callable[[Any], T], usual: str = DRIVES[0]) -> T:
-        """Return the plant that ``plant``, ``hysteresis`` and ``hysteresis_drive`` name.
+        """Return the plant that ``plant``, ``hysteresis``, ``hysteresis_drive`` and ``air`` name.
 
         Without ``plant`` it is ``default`` of a kind of hysteresis: of the model's form with the
         drive ``usual``, where there is one and no other drive is given.
         """
+        made = self._hysteretic_plant(kind, default, usual)
+        if self.air is None:
+            return made
+        check_choice("air", self.air, AIRS)
+        return made.with_air(self.air)  # type: ignore[attr-defined, no-any-return]
+
+    def _hysteretic_plant(self, kind: type[T], default: Callable[[Any], T], usual: str) -> T:
         plant, hysteresis, drive = self.plant, self.hysteresis, self.hysteresis_drive
         if drive is not None:
             check_choice("hysteresis_drive", drive, DRIVES)
@@ -191,7 +203,7 @@ class Common:
     def spread_of(self, plant: Any, which: Randomisation) -> NDArray[np.float64]:
         """Return (row, low, high) of each parameter that every episode draws, checked."""
         names, ranges, table = list(which.parameters), self._ranges(plant, which), []
-        allowed = [name for name in names if name not in which.fixed]
+        allowed = [name for name in names if name not in (*which.fixed, SWITCH)]
         for name, span in ranges.items():
             if name not in allowed:
                 raise ValueError(
@@ -212,7 +224,8 @@ class Common:
                 plant.replace({name: end})  # refuses values out of bounds and unstable plants
             table.append((names.index(name), low, high))
         worst = {name: min(ranges[name]) for name in which.lowest if name in ranges}
-        worst |= {name: max(ranges[name]) for name in which.highest if name in ranges}
+        highest = (*which.highest, "regulator.polytropic")
+        worst |= {name: max(ranges[name]) for name in highest if name in ranges}
         for member in plant.members() if ranges else ():
             member.replace(worst)  # refuses a corner that the sub-steps cannot follow
         return np.array(table, float).reshape(-1, 3)

@@ -9,14 +9,34 @@ from __future__ import annotations
 
 from typing import Any
 
-from pam_envs.kernels.build import kernel
+from pam_envs.kernels.build import LANES, kernel
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.pair import N_PAIRS, PAIR, friction_kernels, pair_rows
-from pam_envs.plants.core.muscle_path import DELAYED, PATH_STATE, begin_path, path_step
+from pam_envs.plants.antagonistic_joint.pair import (
+    N_PAIRS,
+    PAIR,
+    friction_kernels,
+    lever_of,
+    pair_rows,
+    volume_of,
+)
+from pam_envs.plants.core.muscle_path import (
+    DELAYED,
+    PATH_STATE,
+    begin_path,
+    path_squeeze,
+    path_step,
+)
 from pam_envs.plants.core.sensors import effect_kernels
+from pam_envs.pneumatics.enclosed_air import REACHED, air_stiffness, enclose, flows_on
 
 FULL_ANGLE, FULL_PRESSURE = 0.5236, 6.5e5
 """Full scales of the sensors [rad, Pa]."""
+
+
+@kernel
+def path_of(m: int) -> int:
+    """Return the first row of the state of a muscle's path."""
+    return PAIR.paths + m * PATH_STATE.end  # type: ignore[no-any-return]
 
 
 @kernel
@@ -25,10 +45,56 @@ def regulate_extended(
 ) -> None:
     """Advance pressure and effective pressure of muscle ``m`` of a tile through a sub-step."""
     path_step(
-        rows, fixed, PAIR.paths + m * PATH_STATE.end, PAIR.path, PAIR.delay + m * DELAYED.end,
+        rows, fixed, path_of(m), PAIR.path, PAIR.delay + m * DELAYED.end,
         K.REGULATOR_MAX_PRESSURE, PAIR.warm, rows[PAIR.pressure + m], rows[PAIR.set_point + m],
         rows[PAIR.effective + m], work[m], counts[K.STEP], i, substeps, period,
     )  # fmt: skip
+
+
+@kernel
+def enclose_air(
+    rows: Any, fixed: Any, j: int, m: int, contraction: float, rate: float, ahead: float
+) -> None:
+    """Write the volume of muscle ``m`` of lane ``j``, and its change with the angle [m3/rad].
+
+    ``rate`` is ``dL/dphi`` [m], ``ahead`` the turn [rad] that is predicted.
+    """
+    fall = fixed[K.MUSCLE_TAPER][j] / fixed[K.MUSCLE_STRETCH][j] * contraction
+    area = fixed[K.MUSCLE_AREA][j] * (1.0 - fall)
+    enclose(
+        rows, j, path_of(m) + PATH_STATE.air, volume_of(fixed, j, contraction), -area * rate, ahead
+    )
+
+
+@kernel
+def settle_air(rows: Any, fixed: Any, h: float, work: Any) -> None:
+    """Move the enclosed air of all muscles of a tile with the motion, where air flows."""
+    if flows_on(fixed, PAIR.path) == 0:
+        return
+    straight = rows[PAIR.straight]
+    for m in range(2 * N_PAIRS):
+        at, rate, velocity = rows[PAIR.at + m], work[2 * N_PAIRS + m], rows[PAIR.velocity + m // 2]
+        for j in range(LANES):
+            ahead = 0.5 * h * velocity[j]
+            enclose_air(rows, fixed, j, m, at[j] + straight[j], rate[j], ahead)
+        path_squeeze(
+            rows, fixed, path_of(m), PAIR.path, rows[PAIR.pressure + m], rows[PAIR.effective + m],
+            REACHED,
+        )  # fmt: skip
+
+
+@kernel
+def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the enclosed air of all muscles of lane ``j`` at its angles."""
+    for m in range(2 * N_PAIRS):
+        x, rate, _ = lever_of(fixed, j, rows[PAIR.angle + m // 2][j], 1.0 - 2.0 * (m % 2))
+        enclose_air(rows, fixed, j, m, x, rate, 0.0)
+
+
+@kernel
+def enclosed_stiffness(rows: Any, j: int, m: int) -> float:
+    """Return the stiffness [N m/rad] of the air in muscle ``m`` of lane ``j``."""
+    return air_stiffness(rows, j, path_of(m) + PATH_STATE.air)
 
 
 @kernel
@@ -36,9 +102,8 @@ def begin_paths(rows: Any, fixed: Any, j: int) -> None:
     """Begin the paths of all muscles of lane ``j`` at their pressures."""
     for m in range(2 * N_PAIRS):
         rows[PAIR.effective + m][j] = begin_path(
-            rows, fixed, j, PAIR.paths + m * PATH_STATE.end, PAIR.path, PAIR.warm,
-            rows[PAIR.pressure + m][j],
-        )  # fmt: skip
+            rows, fixed, j, path_of(m), PAIR.path, PAIR.warm, rows[PAIR.pressure + m][j]
+        )
 
 
 @kernel
@@ -68,4 +133,6 @@ def pair_kernels(kind: str, layout: Any, pairs: int, effects: int | None) -> dic
         [FULL_ANGLE] * pairs + [FULL_PRESSURE] * muscles, angles=pairs,
     )  # fmt: skip
     begin = begin_paths_and_bearing if "bearing" in block._fields else begin_paths
-    return found | shown | {"regulate": regulate_extended, "begin_muscles": begin}
+    air = {"settle_air": settle_air, "begin_enclosed": begin_enclosed}
+    air["enclosed_stiffness"] = enclosed_stiffness
+    return found | shown | air | {"regulate": regulate_extended, "begin_muscles": begin}

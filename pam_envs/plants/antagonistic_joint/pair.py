@@ -86,6 +86,22 @@ def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def settle_air(rows: Any, fixed: Any, h: float, work: Any) -> None:
+    """Move the enclosed air of a tile with the motion: a plain plant has regulators."""
+
+
+@kernel
+def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the enclosed air of the muscles of lane ``j``: a plain plant has regulators."""
+
+
+@kernel
+def enclosed_stiffness(rows: Any, j: int, m: int) -> float:
+    """Return the stiffness [N m/rad] of the air in muscle ``m``: none in a plain plant."""
+    return 0.0
+
+
+@kernel
 def advance(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, substeps: int,
     period: float, work: Any,
@@ -101,6 +117,7 @@ def advance(
         for m in range(2 * N_PAIRS):
             regulate(rows, fixed, counts, m, i, substeps, period, work)
         move(rows, fixed, counts, table, hysteresis, elements, h, work)
+        settle_air(rows, fixed, h, work)
     for j in range(LANES):
         report_state(rows, fixed, j)
     read_sensors(rows, fixed, counts[K.STEP], period)
@@ -269,7 +286,8 @@ def turning(
         work[m][j], rows[PAIR.effective + m][j], rows[PAIR.lag + m][j], rows[PAIR.stick + m][j],
     )  # fmt: skip
     square = rate * rate * per_length
-    return -old * rate, -new * rate, stiff * square + 0.5 * (old + new) * curve, viscous * square
+    stiff = stiff * square + 0.5 * (old + new) * curve + enclosed_stiffness(rows, j, m)
+    return -old * rate, -new * rate, stiff, viscous * square
 
 
 @kernel
@@ -312,10 +330,10 @@ def stop_torque(fixed: Any, j: int, angle: float) -> tuple[float, float]:
 
 
 @kernel
-def air_of(fixed: Any, j: int, contraction: float, pressure: float) -> float:
-    """Return the air in a muscle [kg]."""
+def volume_of(fixed: Any, j: int, contraction: float) -> float:
+    """Return the inner volume of a muscle [m3]."""
     bore = 0.25 * math.pi * fixed[K.MUSCLE_DIAMETER][j] * fixed[K.MUSCLE_DIAMETER][j]
-    space = inner_volume(
+    return inner_volume(
         contraction,
         fixed[K.MUSCLE_AREA][j],
         fixed[K.MUSCLE_TAPER][j],
@@ -323,6 +341,12 @@ def air_of(fixed: Any, j: int, contraction: float, pressure: float) -> float:
         bore,
         fixed[K.MUSCLE_REST_LENGTH][j],
     )
+
+
+@kernel
+def air_of(fixed: Any, j: int, contraction: float, pressure: float) -> float:
+    """Return the air in a muscle [kg]."""
+    space = volume_of(fixed, j, contraction)
     return DENSITY_PER_PRESSURE * (max(0.0, pressure) + ATMOSPHERE) * space
 
 

@@ -76,6 +76,16 @@ class AntagonisticJoint(PairPlant, rows=K):
         """Dead time [s] from a setpoint to the pressure."""
         return 0.0 if self.dynamics == "reduced" else self.regulator.dead_time
 
+    @property
+    def flowless(self) -> str:
+        """Reason why this variant has no flow through a regulator's orifices, and the remedy."""
+        return (
+            "dynamics = 'reduced' moves by its commands, without air; take dynamics = 'muscles' or "
+            "air = 'regulator'"
+            if self.dynamics == "reduced"
+            else ""
+        )
+
     def _check(self) -> None:
         """Refuse angles out of reach, and a motion that the sub-steps cannot follow."""
         super()._check()
@@ -86,8 +96,10 @@ class AntagonisticJoint(PairPlant, rows=K):
             )
         link = self.link
         full = float(np.max(self.stiffness(link.stop, FULL_PRESSURE, FULL_PRESSURE)))
+        turns = np.linspace(-link.stop, link.stop, 45)
+        air = self.air_stiffness(*self.volumes(turns))
         self.check_phase(
-            (full + link.stop_stiffness) / link.inertia,
+            (full + 2.0 * air + link.stop_stiffness) / link.inertia,
             link.damping / link.inertia,
             f"link.inertia = {link.inertia:g} kg m2 with link.damping = {link.damping:g} N m s/rad",
         )

@@ -113,6 +113,15 @@ class PairPlant(Plant):
         gains = self.muscle.gain * (1.0 + np.array(SIDES) * self.muscle.imbalance)
         return -np.sum(gains * self.muscle.force(p, x) * self.lever.rate(angle), axis=-1)
 
+    def volumes(self, angle: ArrayLike) -> tuple[Array, Array]:
+        """Return the inner volumes [m3] of both muscles at angles [rad], shape (..., 2).
+
+        And their changes with the angle [m3/rad].
+        """
+        x = self.lever.contraction(angle, self.muscle.rest_length)
+        gives = -self.muscle.area_at(x) * self.lever.rate(angle)
+        return self.muscle.volume_at(x), gives
+
     def imposed_muscles(self, cycles: int) -> ImposedMuscles:
         """Return a pair under imposed pressures (2, n) [Pa] and an angle [rad], always taut.
 

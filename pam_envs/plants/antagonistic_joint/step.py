@@ -24,6 +24,7 @@ from pam_envs.plants.antagonistic_joint.effects import pair_kernels
 from pam_envs.plants.antagonistic_joint.pair import (
     PAIR,
     begin_delays,
+    begin_enclosed,
     begin_muscles,
     command,
     contract,
@@ -152,6 +153,7 @@ def begin_lane(
     begin_muscles(rows, fixed, j)
     rest(rows, fixed, counts, table, hysteresis, elements, j)
     rows[K.VELOCITY][j] = 0.0
+    begin_enclosed(rows, fixed, j)
     report_state(rows, fixed, j)
     begin_sensors(rows, fixed, j)
 

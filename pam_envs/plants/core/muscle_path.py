@@ -2,6 +2,9 @@
 
     setpoint -> dead time -> regulator, supply, leak -> line -> creep -> temperature, first cycles
 
+With ``regulator.flow`` the regulator is the flow of air into the muscle's volume; the plant calls
+:func:`path_squeeze` before the path and after the motion (``pneumatics.enclosed_air``).
+
 For plants whose hysteresis follows the contraction; each muscle has a state of its own, and all
 muscles of a plant share the parameters. A plain plant has dead time and regulator
 (:func:`follow_set_point`), an extended one all of the path (:func:`path_step`).
@@ -23,6 +26,7 @@ from pam_envs.kernels.build import LANES, kernel, routine, scratch
 from pam_envs.kernels.history import N_HISTORY, fill_ring
 from pam_envs.muscle.effects import TemperatureEffects, temperature_factor
 from pam_envs.parameters import declarations, named_rows, parameter_rows, row_blocks
+from pam_envs.pneumatics.enclosed_air import AHEAD, flow_step, flows_on, squeeze, without_flow
 from pam_envs.pneumatics.regulator import (
     AIR_STATE,
     RegulatorEffects,
@@ -45,7 +49,7 @@ PATH = parameter_rows(RegulatorEffects, CreepEffects, FirstCycles)
 """Rows of the effects that all muscles of a plant share, from the first."""
 WARM = parameter_rows(TemperatureEffects)
 """Rows of the temperature of a muscle and its effect, from the first."""
-PATH_STATE = row_blocks(air=len(AIR_STATE), travel=1, creep=4)
+PATH_STATE = row_blocks(air=len(AIR_STATE), travel=1, creep=4, factor=1)
 """State of a muscle's path, from its first row."""
 PATH_NAMES = (
     *(f"regulator.{name}" for name in declarations(RegulatorEffects)),
@@ -123,17 +127,44 @@ def path_air(
         fixed[plain + REGULATOR.slew_rate],
     )
     valve, lines = valve_effects_on(fixed, effects), line_effects_on(fixed, effects)
+    flows, travel = flows_on(fixed, effects), rows[state + PATH_STATE.travel]
     late_shares(rows[delayed + DELAYED.switch], i, substeps, period, late)
-    for stage in range(2):  # towards the older setpoint, then towards the newer one
+    if flows > 0:
+        flow_step(
+            rows, fixed, state + PATH_STATE.air, effects, pressure, rows[delayed + DELAYED.older],
+            rows[delayed + DELAYED.newer], late, period / substeps, own, valve, lines,
+        )  # fmt: skip
+        for j in range(LANES):
+            travel[j] = travel[j] + abs(pressure[j] - own[1][j])
+    for stage in range(0 if flows == LANES else 2):  # towards the older, then the newer setpoint
         if stage_widths(late, stage, period / substeps, width) == 0:
             continue
+        if flows > 0:
+            without_flow(fixed, effects, width)
         air_step(
             rows, fixed, state + PATH_STATE.air, effects, pressure, full, lag, slew,
             rows[delayed + (DELAYED.newer if stage == 1 else DELAYED.older)], width, own, valve,
             lines,
         )  # fmt: skip
         for j in range(LANES):
-            rows[state + PATH_STATE.travel][j] += abs(pressure[j] - own[1][j])
+            travel[j] += abs(pressure[j] - own[1][j])
+
+
+@routine
+def path_squeeze(
+    rows: Any, fixed: Any, state: int, effects: int, pressure: Any, effective: Any, share: float
+) -> None:
+    """Move the air of one muscle of a tile with the motion (:func:`squeeze`), where air flows.
+
+    ``share`` is ``AHEAD`` before the path of a sub-step, ``REACHED`` after the motion. Effective
+    pressures change with the pressures; creep stays.
+    """
+    if flows_on(fixed, effects) == 0:
+        return
+    own, factor = scratch(1, LANES), rows[state + PATH_STATE.factor]
+    squeeze(rows, fixed, state + PATH_STATE.air, effects, pressure, own[0], share)
+    for j in range(LANES):
+        effective[j] = max(0.0, effective[j] + factor[j] * own[0][j])
 
 
 @routine
@@ -188,14 +219,15 @@ def path_step(
 
     ``was`` receives the effective pressures before it [Pa] (:func:`path_air`, :func:`path_muscle`).
     """
-    own = scratch(2, LANES)
+    own, factor = scratch(1, LANES), rows[state + PATH_STATE.factor]
+    path_squeeze(rows, fixed, state, effects, pressure, effective, AHEAD)
     path_air(
         rows, fixed, state, effects, delayed, plain, pressure, set_point, step, i, substeps, period
     )
-    path_muscle(rows, fixed, state, effects, warm, pressure, period / substeps, own[0], own[1])
+    path_muscle(rows, fixed, state, effects, warm, pressure, period / substeps, own[0], factor)
     for j in range(LANES):
         was[j] = effective[j]
-        effective[j] = max(0.0, pressure[j] + own[0][j]) * own[1][j]
+        effective[j] = max(0.0, pressure[j] + own[0][j]) * factor[j]
 
 
 @kernel
@@ -207,4 +239,5 @@ def begin_path(
     rows[state + PATH_STATE.travel][j] = 0.0
     crept = begin_creep(rows, fixed, j, state + PATH_STATE.creep, effects + PATH.creep_1, pressure)
     factor = path_factor(rows, fixed, j, state, effects, warm)
+    rows[state + PATH_STATE.factor][j] = factor
     return max(0.0, pressure + crept) * factor

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.constants import ATMOSPHERE
 from pam_envs.hysteresis.protocol import (
     HysteresisModel,
     Usage,
@@ -25,6 +26,7 @@ from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
 from pam_envs.plants.core.passivity import ImposedMuscles
+from pam_envs.pneumatics.flow import AIRS, SWITCH
 from pam_envs.pneumatics.regulator import NO_SLEW_LIMIT
 from pam_envs.wording import near
 
@@ -165,7 +167,18 @@ class Plant:
                 "4 is the default"
             )
         self._model.check(self._usage())
+        self._check_air()
         self._check()
+
+    def _check_air(self) -> None:
+        """Refuse a switch that is neither on nor off, and flow where the variant has none."""
+        flow = self._flow
+        if flow not in (0.0, 1.0):
+            raise ValueError(
+                f"{SWITCH} = {flow:g} must be 0 (air = 'regulator') or 1 (air = 'flow')"
+            )
+        if flow and self.flowless:
+            raise ValueError(f"air = 'flow' ({SWITCH} = 1): {self.flowless}")
 
     def _usage(self) -> Usage:
         """Return the demands on the hysteresis operator."""
@@ -230,6 +243,39 @@ class Plant:
     def dead_time(self) -> float:
         """Dead time [s] from a setpoint to the pressure; 0 where the dynamics have none."""
         return self.regulator.dead_time  # type: ignore[attr-defined, no-any-return]
+
+    @property
+    def _flow(self) -> float:
+        """1 with flow through the regulator's orifices; 0 without, or without a regulator."""
+        return self.value(SWITCH) if SWITCH in self.names else 0.0
+
+    @property
+    def air(self) -> str:
+        """Air supply: ``"regulator"``, closed-loop, or ``"flow"`` through its orifices."""
+        return AIRS[int(self._flow)]
+
+    @property
+    def flowless(self) -> str:
+        """Reason why this variant has no flow through a regulator's orifices, and the remedy."""
+        return ""
+
+    def with_air(self, air: str) -> Self:
+        """Return the plant with an air supply, ``"regulator"`` or ``"flow"``."""
+        if air not in AIRS:
+            raise ValueError(f"air = {air!r}; choose one of {', '.join(AIRS)}")
+        return self.replace({SWITCH: float(AIRS.index(air))})
+
+    def air_stiffness(self, volume: ArrayLike, gives: ArrayLike) -> float:
+        """Return the largest stiffness ``n p_abs / V (dV/dx)^2`` of the air in one muscle.
+
+        At full pressure, 0 without flow; ``volume`` [m3] and its change with the displacement
+        ``gives`` are those of several positions.
+        """
+        if not self._flow:
+            return 0.0
+        full = self.value("regulator.max_pressure") + ATMOSPHERE
+        worst = np.max(np.square(gives) / np.asarray(volume, float))
+        return float(self.value("regulator.polytropic") * full * worst)
 
     @property
     def extended(self) -> bool:

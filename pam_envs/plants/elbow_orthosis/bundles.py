@@ -127,7 +127,7 @@ def exchange_regulated(
 
 
 @kernel
-def settle_regulated(rows: Any, fixed: Any, work: Any) -> None:
+def settle_regulated(rows: Any, fixed: Any, h: float, work: Any) -> None:
     """Keep the pressures; the increase of the air inside comes from the supply."""
     for side in range(2):
         for j in range(LANES):
@@ -226,7 +226,7 @@ def outflow(
 
 
 @kernel
-def settle_pulsed(rows: Any, fixed: Any, work: Any) -> None:
+def settle_pulsed(rows: Any, fixed: Any, h: float, work: Any) -> None:
     """Write the pressures of the air that is inside."""
     for side in range(2):
         for j in range(LANES):

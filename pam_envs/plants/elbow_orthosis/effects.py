@@ -16,10 +16,23 @@ from pam_envs.plants.core.muscle_path import (
     begin_path,
     path_air,
     path_muscle,
+    path_squeeze,
 )
 from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.plants.elbow_orthosis import rows as K
-from pam_envs.plants.elbow_orthosis.bundles import AIR, GIVES_A, NOW_A, WAS_A, count_used_air
+from pam_envs.plants.elbow_orthosis.bundles import (
+    AIR,
+    GIVES_A,
+    NOW_A,
+    WAS_A,
+    contraction_at,
+    count_used_air,
+    factors_of,
+    shape_of,
+    volume_of,
+)
+from pam_envs.pneumatics.enclosed_air import AHEAD, REACHED, enclose, flows_on
+from pam_envs.pneumatics.regulator import AIR_STATE
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 FULL_SCALES = (2.1, 6e5, 6e5)
@@ -35,13 +48,16 @@ def path_of(side: int) -> int:
 
 
 @kernel
+def factor_of(rows: Any, side: int) -> Any:
+    """Return the factors of temperature and first cycles on the pressures of a bundle."""
+    return rows[path_of(side) + PATH_STATE.factor]
+
+
+@kernel
 def effective_pressures(rows: Any, fixed: Any, side: int, h: float, work: Any) -> None:
     """Turn the pressures of a bundle before and after a sub-step into effective ones."""
     was, now, gives = work[WAS_A + side], work[NOW_A + side], work[GIVES_A + side]
-    crept, factor = (
-        rows[EFFECTS_AT + K.STATE.crept + side],
-        rows[EFFECTS_AT + K.STATE.factor + side],
-    )
+    crept, factor = rows[EFFECTS_AT + K.STATE.crept + side], factor_of(rows, side)
     effective = rows[EFFECTS_AT + K.STATE.effective + side]
     path_muscle(
         rows,
@@ -68,6 +84,8 @@ def exchange_regulated(
     h = period / substeps
     for side in range(2):
         pressure = rows[K.PRESSURE_A + side]
+        effective = rows[EFFECTS_AT + K.STATE.effective + side]
+        path_squeeze(rows, fixed, path_of(side), K.EFFECT.path, pressure, effective, AHEAD)
         path_air(
             rows, fixed, path_of(side), K.EFFECT.path, K.DELAY + side * DELAYED.end,
             K.REGULATOR_MAX_PRESSURE, pressure, rows[K.COMMAND_A + side],
@@ -75,7 +93,7 @@ def exchange_regulated(
         )  # fmt: skip
         for j in range(LANES):
             work[NOW_A + side][j] = pressure[j]
-            work[GIVES_A + side][j] = 0.0
+            work[GIVES_A + side][j] = rows[path_of(side) + PATH_STATE.air + AIR_STATE.slope][j]
         effective_pressures(rows, fixed, side, h, work)
 
 
@@ -93,23 +111,48 @@ def exchange_pulsed(
 
 
 @kernel
-def settle_regulated(rows: Any, fixed: Any, work: Any) -> None:
-    """Keep the pressures of regulated bundles and their effective pressures."""
+def settle_regulated(rows: Any, fixed: Any, h: float, work: Any) -> None:
+    """Keep the pressures of regulated bundles and their effective pressures, but for motion."""
     for side in range(2):
+        effective, pressure = rows[EFFECTS_AT + K.STATE.effective + side], rows[K.PRESSURE_A + side]
         for j in range(LANES):
-            rows[EFFECTS_AT + K.STATE.effective + side][j] = work[NOW_A + side][j]
+            effective[j] = work[NOW_A + side][j]
+        if flows_on(fixed, K.EFFECT.path) > 0:
+            ahead = 2.0 * side - 1.0
+            for j in range(LANES):
+                travel = ahead * fixed[K.PULLEY_RADIUS][j] * rows[K.VELOCITY][j]
+                enclose_air(rows, fixed, j, side, 0.5 * h * travel)
+            path_squeeze(rows, fixed, path_of(side), K.EFFECT.path, pressure, effective, REACHED)
+        for j in range(LANES):
             count_used_air(rows, fixed, j, side)
 
 
 @kernel
-def settle_pulsed(rows: Any, fixed: Any, work: Any) -> None:
-    """Write the pressures of the air that is inside, and the effective ones."""
-    plain_settle(rows, fixed, work)
+def enclose_air(rows: Any, fixed: Any, j: int, side: int, ahead: float) -> None:
+    """Write the volume of a bundle of lane ``j``, and its change with the contraction [m2].
+
+    ``ahead`` is the predicted contraction [m].
+    """
+    contraction = contraction_at(fixed, j, side, rows[K.ANGLE][j])
+    shape, _ = shape_of(fixed, j, side, contraction)
+    _, pressed = factors_of(fixed, j, side)
+    volume = volume_of(fixed, j, side, contraction)
+    enclose(rows, j, path_of(side) + PATH_STATE.air, volume, pressed * shape, ahead)
+
+
+@kernel
+def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the enclosed air of both bundles of lane ``j`` at its angle."""
     for side in range(2):
-        crept, factor = (
-            rows[EFFECTS_AT + K.STATE.crept + side],
-            rows[EFFECTS_AT + K.STATE.factor + side],
-        )
+        enclose_air(rows, fixed, j, side, 0.0)
+
+
+@kernel
+def settle_pulsed(rows: Any, fixed: Any, h: float, work: Any) -> None:
+    """Write the pressures of the air that is inside, and the effective ones."""
+    plain_settle(rows, fixed, h, work)
+    for side in range(2):
+        crept, factor = rows[EFFECTS_AT + K.STATE.crept + side], factor_of(rows, side)
         for j in range(LANES):
             pressure = max(0.0, rows[K.PRESSURE_A + side][j] + crept[j])
             rows[EFFECTS_AT + K.STATE.effective + side][j] = pressure * factor[j]
@@ -137,4 +180,5 @@ def bundle_kernels(valves: str, first: int) -> dict[str, Any]:
         "exchange_air": exchange_regulated if regulated else exchange_pulsed,
         "settle": settle_regulated if regulated else settle_pulsed,
         "begin_muscles": begin_muscles,
+        "begin_enclosed": begin_enclosed,
     }

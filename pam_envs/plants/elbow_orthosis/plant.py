@@ -18,7 +18,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -85,6 +85,28 @@ class ElbowOrthosis(Plant, rows=K):
         """Dead time [s] from a setpoint to the pressure."""
         return 0.0 if self.valves == "on_off" else self.regulator.dead_time
 
+    @property
+    def air(self) -> str:
+        """Air supply: ``"regulator"``, or ``"flow"``, always so with on/off valves."""
+        return "flow" if self.valves == "on_off" else super().air
+
+    @property
+    def flowless(self) -> str:
+        """Reason why this variant has no flow through a regulator's orifices, and the remedy."""
+        own = "valves = 'on_off' have a flow of their own; leave regulator.flow at 0"
+        return own if self.valves == "on_off" else ""
+
+    def with_air(self, air: str) -> Self:
+        """Return the plant with an air supply; that of on/off valves is ``"flow"``."""
+        if self.valves != "on_off":
+            return super().with_air(air)
+        if air != "flow":
+            raise ValueError(
+                f"air = {air!r}: valves = 'on_off' let air flow; choose 'flow', or take "
+                "valves = 'proportional'"
+            )
+        return self
+
     def _usage(self) -> Usage:
         return Usage("an elbow", "virgin", reach=0.55 * self.pulley.stroke)
 
@@ -125,7 +147,7 @@ class ElbowOrthosis(Plant, rows=K):
             area = bundle.pressure_factor * float(bundle.shape(0.0))
             air = self.full_pressure + ATMOSPHERE
             total += area * area * air / bundle.nominal_volume * self.pulley.radius**2
-        return total
+        return total * (self.regulator.polytropic if self.regulator.flow else 1.0)
 
     # --- presets --------------------------------------------------------------------------------
 

@@ -48,7 +48,7 @@ globals().update(
             pressure="noise resolution bias",
         ),
         path_effects("bundle_a", "bundle_b", bearing="link", sensors=("angle", "pressure")),
-        each("effective crept factor", 2)
+        each("effective crept", 2)
         | {"paths": 2 * PATH_STATE.end, "stuck": 1, "sensors": sensor_rows(3)},
         {"model": NUMBERS, "largest_lag": 1},
         operators=2,

@@ -61,6 +61,11 @@ def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the enclosed air of the bundles: a plain plant has regulators, or counts its air."""
+
+
+@kernel
 def lag_of(rows: Any, j: int, side: int) -> float:
     """Return the hysteresis lag [m] of the travel that a bundle has."""
     return rows[K.LAG_A + side * (OPERATORS - 1)][j]  # type: ignore[no-any-return]
@@ -213,7 +218,7 @@ def advance(
         slide(rows, fixed, counts, table, hysteresis, elements, 0, LANES)
         exchange_air(rows, fixed, counts, i, substeps, period, work)
         swing(rows, fixed, i, substeps, h, work)
-        settle(rows, fixed, work)
+        settle(rows, fixed, h, work)
     for j in range(LANES):
         rows[K.AT_A][j] = travel_at(fixed, j, rows[K.ANGLE][j])
     slide(rows, fixed, counts, table, hysteresis, elements, 0, LANES)
@@ -312,6 +317,7 @@ def begin_lane(
     start_air(rows, fixed, j)
     for side in range(2):
         rows[K.AIR_A + side][j] = air_at(rows, fixed, j, side)
+    begin_enclosed(rows, fixed, j)
     report(rows, fixed, j)
     begin_sensors(rows, fixed, j)
 

@@ -9,13 +9,24 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, scratch
-from pam_envs.plants.core.muscle_path import PATH_STATE, begin_path, path_air, path_muscle
+from pam_envs.mechanics.knee_lever import muscle_length
+from pam_envs.muscle.gas_spring import gas_volume, stretch_of
+from pam_envs.plants.core.muscle_path import (
+    PATH_STATE,
+    begin_path,
+    path_air,
+    path_muscle,
+    path_squeeze,
+)
 from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.plants.knee_orthosis import rows as K
+from pam_envs.pneumatics.enclosed_air import AHEAD, REACHED, air_stiffness, enclose, flows_on
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
-plain_regulate: Any = None  # placeholder: the dynamics of the pressure of the plain plant
+plain_regulate: Any = None  # placeholders: the dynamics of the pressure of the plain plant, and the
+angle_ahead: Any = None  # predicted angle
 
 MEASURED = (K.TENSION, K.ANGLE, K.PRESSURE, K.HEEL, K.GROUND_Z, K.COP, K.ANKLE)
 """Rows of the quantities that ``SENSORS`` measure."""
@@ -28,11 +39,75 @@ def regulate_with_lag(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float
 ) -> None:
     """Advance the pressures of a tile behind the lag of the regulator, with all effects."""
+    squeeze_muscle(rows, fixed, AHEAD)
     path_air(
         rows, fixed, EFFECTS_AT + K.STATE.path, K.EFFECT.path, K.DELAY, K.REGULATOR_MAX_PRESSURE,
         rows[K.PRESSURE], rows[K.SET_POINT], counts[K.STEP], i, substeps, period,
     )  # fmt: skip
     advance_muscle(rows, fixed, period / substeps)
+
+
+@kernel
+def squeeze_muscle(rows: Any, fixed: Any, share: float) -> None:
+    """Move the enclosed air of a tile with the motion, where air flows (:func:`path_squeeze`).
+
+    The stiffness changes with the effective pressure as without hysteresis.
+    """
+    if flows_on(fixed, K.EFFECT.path) == 0:
+        return
+    effective, stiffness, was = (
+        rows[EFFECTS_AT + K.STATE.effective],
+        rows[K.STIFFNESS],
+        scratch(1, LANES),
+    )
+    for j in range(LANES):
+        was[0][j] = effective[j]
+    path_squeeze(
+        rows, fixed, EFFECTS_AT + K.STATE.path, K.EFFECT.path, rows[K.PRESSURE], effective, share
+    )
+    for j in range(LANES):
+        effective[j] = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective[j])
+        gain = fixed[K.MUSCLE_GAIN][j] * fixed[K.MUSCLE_STIFFNESS_RATIO][j]
+        stiffness[j] = stiffness[j] + gain * (effective[j] - was[0][j])
+
+
+@kernel
+def enclose_air(rows: Any, fixed: Any, j: int, angle: float, ahead: float) -> None:
+    """Write the volume of the muscle of lane ``j`` at an angle, and its change with it [m3/rad].
+
+    ``ahead`` is the predicted turn [rad].
+    """
+    sine, cosine = sine_and_cosine(0.5 * angle)
+    arm, shortest = fixed[K.LEVER_ARM][j], fixed[K.MUSCLE_SHORTEST_LENGTH][j]
+    ratio = fixed[K.MUSCLE_STIFFNESS_RATIO][j]
+    length = muscle_length(sine, arm, fixed[K.LEVER_FITTINGS][j])
+    volume = gas_volume(length, shortest, ratio, fixed[K.MUSCLE_FULL_VOLUME][j])
+    gives = -ratio * stretch_of(length, shortest) * arm * cosine
+    enclose(rows, j, EFFECTS_AT + K.STATE.path + PATH_STATE.air, volume, gives, ahead)
+
+
+@kernel
+def settle_air(rows: Any, fixed: Any, h: float, work: Any) -> None:
+    """Move the enclosed air of a tile with the motion, where air flows."""
+    if flows_on(fixed, K.EFFECT.path) == 0:
+        return
+    for j in range(LANES):
+        angle = angle_ahead(rows, fixed, j, 0.0, work)
+        ahead = angle_ahead(rows, fixed, j, 0.5 * h, work) - angle
+        enclose_air(rows, fixed, j, angle, ahead)
+    squeeze_muscle(rows, fixed, REACHED)
+
+
+@kernel
+def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the enclosed air of the muscle of lane ``j`` at its angle."""
+    enclose_air(rows, fixed, j, rows[K.ANGLE][j], 0.0)
+
+
+@kernel
+def enclosed_stiffness(rows: Any, j: int) -> float:
+    """Return the stiffness [N m/rad] of the air in the muscle of lane ``j``."""
+    return air_stiffness(rows, j, EFFECTS_AT + K.STATE.path + PATH_STATE.air)
 
 
 @kernel
@@ -53,7 +128,7 @@ def regulate_as_measured(
 @kernel
 def advance_muscle(rows: Any, fixed: Any, h: float) -> None:
     """Write the effective pressures of a tile after a sub-step, within the regulator's range."""
-    own = scratch(2, LANES)
+    own, factor = scratch(1, LANES), rows[EFFECTS_AT + K.STATE.path + PATH_STATE.factor]
     path_muscle(
         rows,
         fixed,
@@ -63,10 +138,10 @@ def advance_muscle(rows: Any, fixed: Any, h: float) -> None:
         rows[K.PRESSURE],
         h,
         own[0],
-        own[1],
+        factor,
     )
     for j in range(LANES):
-        effective = max(0.0, rows[K.PRESSURE][j] + own[0][j]) * own[1][j]
+        effective = max(0.0, rows[K.PRESSURE][j] + own[0][j]) * factor[j]
         rows[EFFECTS_AT + K.STATE.effective][j] = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective)
 
 
@@ -90,4 +165,7 @@ def muscle_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
         "plain_regulate": plain,
         "regulate": regulate_with_lag if dynamics == "lag" else regulate_as_measured,
         "begin_muscle": begin_muscle,
+        "settle_air": settle_air,
+        "begin_enclosed": begin_enclosed,
+        "enclosed_stiffness": enclosed_stiffness,
     }

@@ -331,6 +331,12 @@ def torque_and_slope(
 
 
 @kernel
+def enclosed_stiffness(rows: Any, j: int) -> float:
+    """Return the stiffness [N m/rad] of the air in the muscle of lane ``j``: none if plain."""
+    return 0.0
+
+
+@kernel
 def feel_nothing(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int,
     angle: float,
@@ -424,7 +430,7 @@ def swing_free(
         drag = fixed[K.LEVER_DAMPING][j] * per_inertia
         old, slope_old = torque_and_slope(rows, fixed, j, angle[j] + ahead, was[j])
         new, slope_new = torque_and_slope(rows, fixed, j, angle[j] + ahead, stiffness[j])
-        slope = max(1.0, 0.5 * (slope_old + slope_new))
+        slope = max(1.0, 0.5 * (slope_old + slope_new) + enclosed_stiffness(rows, j))
         du, velocity[j] = turn(
             rows, fixed, j, velocity[j], (slope * ahead - old) * per_inertia,
             (old - new) * per_inertia / h, slope * per_inertia, drag, per_inertia, h,
@@ -476,7 +482,7 @@ def follow_leg(
         new = new + along_path(fixed, j, turn, bend) - habituated(fixed, j, knee)
         own = rows[K.REFLEX][j] - torque_expected(rows, fixed, j, phase)
         old, new = old + own, new + own
-        slope = 0.5 * (slope_old + slope_new)
+        slope = 0.5 * (slope_old + slope_new) + enclosed_stiffness(rows, j)
         du, rate[j] = damped_motion(
             rate[j],
             (slope * ahead - old - held[j] * off[j]) * per_inertia,

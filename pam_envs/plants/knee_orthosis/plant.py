@@ -142,6 +142,16 @@ class KneeOrthosis(Plant, rows=K):
     def _usage(self) -> Usage:
         return Usage("the orthosis", "low", self.regulator.max_pressure, unit_slope=False)
 
+    @property
+    def flowless(self) -> str:
+        """Reason why this variant has no flow through a regulator's orifices, and the remedy."""
+        return (
+            "dynamics = 'measured' is the response of regulator and muscle together; take "
+            "dynamics = 'lag' or air = 'regulator'"
+            if self.dynamics == "measured"
+            else ""
+        )
+
     def _check(self) -> None:
         """Refuse too fast a motion, and a strap with which the wire opens past its toggle."""
         lever, leg, hold = self.lever, self.leg, 0.0
@@ -151,8 +161,14 @@ class KneeOrthosis(Plant, rows=K):
             damping += leg.hold_damping + leg.stance_damping + leg.damping
             hold = leg.hold_stiffness + 2.0 * leg.stance_stiffness + leg.stiffness
         pull = self.muscle.gain * self.muscle.stiffness_ratio * self.regulator.max_pressure
+        air = 0.0
+        if self.mounting != "rig":
+            lengths = self.lever.length(np.linspace(0.0, np.pi, 45))
+            stretch = np.maximum(0.0, lengths - self.muscle.shortest_length)
+            gives = self.muscle.stiffness_ratio * stretch * lever.arm
+            air = self.air_stiffness(self.muscle.volume_at(lengths), gives)
         self.check_phase(
-            (lever.stiffness + hold + pull * lever.arm**2) / inertia,
+            (lever.stiffness + hold + pull * lever.arm**2 + air) / inertia,
             damping / inertia,
             f"lever.inertia = {lever.inertia:g} kg m2 with lever.damping = {lever.damping:g} "
             f"N m s/rad and lever.stiffness = {lever.stiffness:g} N m/rad",

@@ -132,6 +132,16 @@ def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def settle_air(rows: Any, fixed: Any, h: float, work: Any) -> None:
+    """Move the enclosed air of a tile with the motion: a plain plant has a regulator."""
+
+
+@kernel
+def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the enclosed air of the muscle of lane ``j``: a plain plant has a regulator."""
+
+
+@kernel
 def lag(rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float) -> None:
     """Advance the pressure behind dead time, rate limit and first-order lag."""
     follow_set_point(
@@ -193,6 +203,7 @@ def advance(
         write_stiffness(rows, fixed, counts, table, hysteresis, 0, LANES, elements)
         feel(rows, fixed, counts, table, hysteresis, elements, 0.5 * h, work)
         move(rows, fixed, counts, gait, i, substeps, h, work)
+        settle_air(rows, fixed, h, work)
         slide(rows, fixed, counts, table, hysteresis, elements, 0.0, work)
     for j in range(LANES):
         report(rows, fixed, j, period)
@@ -224,6 +235,7 @@ def begin_lane(
     rest(rows, fixed, counts, table, gait, hysteresis, elements, j)
     settle_friction(rows, fixed, counts, table, hysteresis, elements, j)
     report(rows, fixed, j, 0.0)
+    begin_enclosed(rows, fixed, j)
     begin_sensors(rows, fixed, j)
     rows[K.OLD_AIR][j] = rows[K.AIR][j]
 

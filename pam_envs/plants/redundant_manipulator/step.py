@@ -36,6 +36,7 @@ from pam_envs.plants.antagonistic_joint.effects import pair_kernels
 from pam_envs.plants.antagonistic_joint.pair import (
     PAIR,
     begin_delays,
+    begin_enclosed,
     begin_muscles,
     command,
     contract,
@@ -158,6 +159,7 @@ def begin_lane(
         rows[M.CHANGE + k][j] = 0.0
         contract(rows, fixed, j, k, rows[M.ANGLE + k][j])
     lag_of(rows, fixed, counts, table, state, elements, 2 * N_STAGES, j, j + 1)
+    begin_enclosed(rows, fixed, j)
     report_state(rows, fixed, j)
     begin_sensors(rows, fixed, j)
 

@@ -8,7 +8,8 @@ plant uses the extended step when an effect is not neutral. The order is that of
     -> first cycles -> creep -> temperature -> law, load, viscosity, strands
     -> support, guide -> length creep -> mount -> sensors
 
-A setpoint below zero means that the valve is shut: the muscle keeps its air except for the leak.
+A setpoint below zero means that the valve is shut: the muscle keeps its air except for the leak;
+with ``regulator.flow`` motion then compresses it.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from pam_envs.kernels.build import LANES, kernel, routine, scratch
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.guide import stick_slip_step
 from pam_envs.mechanics.hanging_mass import MOUNT_STATE, load_fraction, mount_step
-from pam_envs.muscle.effective_area import law_and_slope
+from pam_envs.muscle.effective_area import law_and_slope, volume
 from pam_envs.muscle.effects import (
     slip_strands,
     stiffening,
@@ -41,7 +42,18 @@ from pam_envs.plants.core.sensors import begin_with_effects, effect_kernels, rea
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.rows import STATE as S
+from pam_envs.pneumatics.enclosed_air import (
+    AHEAD,
+    REACHED,
+    air_stiffness,
+    enclose,
+    flow_step,
+    flows_on,
+    squeeze,
+    without_flow,
+)
 from pam_envs.pneumatics.regulator import (
+    AIR,
     air_step,
     begin_air,
     delay_commands,
@@ -116,6 +128,31 @@ def effective_pressure(
             rows[EFFECTS_AT + S.kelvin][j], fixed[R.MUSCLE_TEMPERATURE_GAIN][j]
         )
         drive[j] = drive[j] * gained * (1.0 - fixed[R.HYSTERESIS_FIRST_LOSS][j] * new)
+
+
+@kernel
+def enclose_air(rows: Any, fixed: Any, j: int, ahead: float) -> None:
+    """Write the volume of the muscle of lane ``j``, and its change with the contraction [m2].
+
+    ``ahead`` is the predicted displacement [m].
+    """
+    length, taper = fixed[R.MUSCLE_REST_LENGTH][j], fixed[R.MUSCLE_AREA_TAPER][j]
+    area, curve = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_CURVE][j]
+    e = rows[R.CONTRACTION][j] / length
+    space = volume(e, length, fixed[R.MUSCLE_DIAMETER][j], area, taper, curve)
+    enclose(rows, j, EFFECTS_AT + S.air, space, area * (1.0 - (taper + curve * e) * e), ahead)
+
+
+@kernel
+def squeeze_muscle(rows: Any, fixed: Any, share: float, own: Any) -> None:
+    """Move the enclosed air of a tile with the motion; write the change of effective pressures.
+
+    They change with the pressures as without hysteresis. ``own`` is a row of scratch.
+    """
+    drive = rows[R.DRIVE]
+    squeeze(rows, fixed, EFFECTS_AT + S.air, R.EFFECT.regulator, rows[R.PRESSURE], own, share)
+    for j in range(LANES):
+        drive[j] = drive[j] + own[j]
 
 
 @kernel
@@ -216,6 +253,7 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     """Begin the effects of lane ``j`` at rest at its position and pressure."""
     x = rows[R.CONTRACTION][j]
     begin_air(rows, j, EFFECTS_AT + S.air, rows[R.PRESSURE][j])
+    enclose_air(rows, fixed, j, 0.0)
     rows[EFFECTS_AT + S.travel][j] = 0.0
     rows[EFFECTS_AT + S.stuck][j] = 1.0
     for k in range(4):
@@ -299,7 +337,7 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
         loss = fixed[R.MASS_DAMPING][j] + viscous_damping(
             fixed[R.MUSCLE_VISCOSITY][j], v[j], fixed[R.MUSCLE_VISCOSITY_SPEED][j]
         )
-        stiff = slope * per_length
+        stiff = slope * per_length + air_stiffness(rows, j, EFFECTS_AT + S.air)
         moved = max(0.0, mass) * fixed[R.MASS_CARRIED][j] + fixed[R.MASS_MOVING_MASS][j]
         # motion that is over within the sub-step is followed as slowly as the series reaches
         per_mass = 1.0 / max(moved, loss * h * FASTEST_DECAY, stiff * h * h * FASTEST_TURN)
@@ -373,12 +411,10 @@ def advance_extended(
     older, newer, switch, was, width = work[3], work[4], work[5], work[6], work[7]
     late = work[8]
     own = scratch(8, LANES)
-    creeps = creeps_on(fixed, R.HYSTERESIS_CREEP_1)
+    air, effects, shift, end = EFFECTS_AT + S.air, R.EFFECT.regulator, work[9], own[2]
+    flows, creeps = flows_on(fixed, effects), creeps_on(fixed, R.HYSTERESIS_CREEP_1)
     stretches = creeps_on(fixed, R.MUSCLE_CREEP_1)
-    lines, valve = (
-        line_effects_on(fixed, R.EFFECT.regulator),
-        valve_effects_on(fixed, R.EFFECT.regulator),
-    )
+    lines, valve = line_effects_on(fixed, effects), valve_effects_on(fixed, effects)
     mounts = count_on(fixed[R.MASS_RING_SHARE], 0.0)
     worn = (
         count_on(fixed[R.HYSTERESIS_SHAPE], 1.0)
@@ -390,6 +426,7 @@ def advance_extended(
     )
     strands, sticks = strands_on(fixed, R.MUSCLE_STRAND_1), count_on(fixed[R.MASS_STICK], 0.0)
     fine = sticks + count_on(fixed[R.MUSCLE_VISCOSITY], 0.0)
+    parts = FINE_PARTS if fine > 0 else 1
     for j in range(LANES):
         if load[j] != rows[EFFECTS_AT + S.hung][j]:
             rows[EFFECTS_AT + S.hung][j] = load[j]
@@ -400,13 +437,24 @@ def advance_extended(
     )  # fmt: skip
     for i in range(substeps):
         late_shares(switch, i, substeps, period, late)
+        if flows > 0:
+            squeeze_muscle(rows, fixed, AHEAD, shift)
         for j in range(LANES):
             was[j] = drive[j]
-        for stage in range(2):  # towards the older setpoint, then towards the newer one
+        if flows > 0:
+            flow_step(
+                rows, fixed, air, effects, rows[R.PRESSURE], older, newer, late, h, own, valve,
+                lines,
+            )  # fmt: skip
+            for j in range(LANES):
+                rows[EFFECTS_AT + S.travel][j] += abs(rows[R.PRESSURE][j] - own[1][j])
+        for stage in range(0 if flows == LANES else 2):  # older setpoint, then the newer one
             if stage_widths(late, stage, h, width) == 0:
                 continue
+            if flows > 0:
+                without_flow(fixed, effects, width)
             air_step(
-                rows, fixed, EFFECTS_AT + S.air, R.EFFECT.regulator, rows[R.PRESSURE],
+                rows, fixed, air, effects, rows[R.PRESSURE],
                 fixed[R.REGULATOR_MAX_PRESSURE], fixed[R.REGULATOR_TIME_CONSTANT],
                 fixed[R.REGULATOR_SLEW_RATE], newer if stage == 1 else older, width, own, valve,
                 lines,
@@ -418,23 +466,33 @@ def advance_extended(
                     rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, width, own,
                     creeps, worn,
                 )  # fmt: skip
-        if STAGED == 0:
+        if STAGED == 0 or flows > 0:
             for j in range(LANES):
-                width[j] = h
+                width[j] = h if STAGED == 0 or fixed[effects + AIR.flow][j] > 0.0 else 0.0
             effective_pressure(
                 rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, width, own,
                 creeps, worn,
             )  # fmt: skip
-        parts = FINE_PARTS if fine > 0 else 1
         for j in range(LANES):
-            own[2][j] = drive[j]
+            end[j] = drive[j]
         for q in range(parts):
+            if q > 0 and flows > 0:
+                squeeze_muscle(rows, fixed, AHEAD, shift)
+                for j in range(LANES):
+                    was[j] = drive[j]
+                    end[j] = end[j] + shift[j]
             for j in range(LANES):
-                drive[j] = was[j] + (own[2][j] - was[j]) / (parts - q)
+                drive[j] = was[j] + (end[j] - was[j]) / (parts - q)
             move(
                 rows, fixed, counts, table, hysteresis, elements, was, h / parts, own, strands,
                 sticks, mounts, stretches,
             )  # fmt: skip
+            if flows > 0:
+                for j in range(LANES):
+                    enclose_air(rows, fixed, j, 0.5 * h / parts * rows[R.VELOCITY][j])
+                squeeze_muscle(rows, fixed, REACHED, shift)
+                for j in range(LANES):
+                    end[j] = end[j] + shift[j]
             for j in range(LANES):
                 was[j] = drive[j]
     read_with_effects(rows, fixed, counts[R.STEP], period)

@@ -78,6 +78,7 @@ class SingleMuscle(Plant, rows=R):
             + 3.0 * law.hardening * strains**2
         )
         k = float(slope.max()) / law.rest_length
+        k += self.air_stiffness(law.volume_at(strains), law.area_at(strains))
         self.check_phase(
             k / m.moving_mass,
             m.damping / m.moving_mass,

@@ -23,6 +23,13 @@ WEIGHT = "hysteresis.weight"
 
 GIVEN = {
     "regulator.max_pressure": "RIG.yaml, `regulator: {max_pressure_bar}`",
+    "regulator.flow": "the plant; causes are judged behind closed-loop regulators",
+    "regulator.conductance": "the plant, as `regulator.flow`",
+    "regulator.exhaust_share": "the plant, as `regulator.flow`",
+    "regulator.critical_ratio": "the plant, as `regulator.flow`",
+    "regulator.opening_band": "the plant, as `regulator.flow`",
+    "regulator.polytropic": "the plant, as `regulator.flow`",
+    "regulator.source_pressure": "the plant, as `regulator.flow`",
     "muscle.rest_length": "RIG.yaml, `muscle: {rest_length_mm}`",
     "muscle.diameter": "RIG.yaml, `muscle: {diameter_mm}`; only the air consumption depends on it",
     "muscle.braid_angle": "the plant; only drawings depend on it",

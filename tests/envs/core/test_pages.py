@@ -99,6 +99,6 @@ def test_page_lists_arguments_and_defaults(name: str) -> None:
         resolved = {
             "hysteresis": "maxwell_slip", "pace": "slow", "strides": "varied",
             "hysteresis_drive": "pressure" if "Knee" in name else "length",
-            "wearer": "prescribed", "lean": "shank",
+            "wearer": "prescribed", "lean": "shank", "air": "regulator",
         }.get(argument)  # fmt: skip
         assert value == (resolved if default is None and resolved else default), argument
