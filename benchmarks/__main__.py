@@ -320,7 +320,8 @@ def speed(
     """Measure speed, interleaved with other environments, and compare with the targets.
 
     Args:
-        only: Groups to measure: single, batch, plain, start, learning, diagnosis. All by default.
+        only: Groups to measure: single, batch, air, plain, start, learning, diagnosis. All by
+            default.
         rounds: Number of interleaved rounds; the median counts.
         json: Also write the figures to this file.
         strict: Exit code 1 if a minimum is missed.

@@ -14,6 +14,7 @@ Start = Callable[[int], Callable[[], None]]
 GROUPS: dict[str, tuple[Probe, ...]] = {
     "single": (probes.single, probes.single_joints),
     "batch": (probes.batch, probes.variants, probes.growth, probes.cores, probes.processes),
+    "air": (probes.airs,),
     "planning": (probes.planning,),
     "plain": (probes.uncompiled,),
     "start": (probes.start_up,),

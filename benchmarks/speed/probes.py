@@ -15,10 +15,11 @@ import numpy as np
 from benchmarks.speed.rates import Chunk, Measurement, Missing, interleaved, median, ratio
 from pam_envs.mechanics.redundancy.resolution import resolve
 from pam_envs.mechanics.serial_chain.chain import SerialChain
+from pam_envs.pneumatics.flow import AIRS
 from pam_envs.references.path import PATHS
 
 ENV = "PAM/MusclePositioning-v0"
-KNEE = "PAM/KneeWalk-v0"
+KNEE, BRACE = "PAM/KneeWalk-v0", "PAM/KneeTension-v0"
 ELBOW = "PAM/ElbowOrthosis-v0"
 ROOT = Path(__file__).resolve().parents[2]
 JOINT, ARM = "PAM/AntagonisticJoint-v0", "PAM/RedundantManipulator-v0"
@@ -66,8 +67,8 @@ def _gym() -> Any:
     return gymnasium
 
 
-def _batch(number: int, mode: str = "vector_entry_point", **kwargs: Any) -> Any:
-    return _gym().make_vec(ENV, num_envs=number, vectorization_mode=mode, **kwargs)
+def _batch(number: int, mode: str = "vector_entry_point", env: str = ENV, **kwargs: Any) -> Any:
+    return _gym().make_vec(env, num_envs=number, vectorization_mode=mode, **kwargs)
 
 
 # --- one environment ------------------------------------------------------------------------
@@ -180,6 +181,20 @@ def variants(rounds: int) -> list[Measurement]:
         Measurement("batch", f"N = 1024, {name} / maxwell_slip", ratio(rates[name], first))
         for name in list(kinds)[1:]
     ]
+
+
+def airs(rounds: int) -> list[Measurement]:
+    """Cost of flow through orifices over that of closed-loop regulators, batch on one core."""
+    results = []
+    for env, calls in ((ENV, 200), (JOINT, 100), (ARM, 8), (ELBOW, 80), (BRACE, 100), (KNEE, 40)):
+        subjects = {
+            air: stepping_batch(_batch(1024, env=env, info=False, threads=1, air=air), calls)
+            for air in AIRS
+        }
+        rates = interleaved(subjects, rounds)
+        value, title = ratio(rates["regulator"], rates["flow"]), f"N = 1024, {env[4:-3]}"
+        results.append(Measurement("air", f"{title}, flow", value, "x", 2.0, 1.5, "less"))
+    return results
 
 
 def _envpool_chunk(number: int) -> Chunk:

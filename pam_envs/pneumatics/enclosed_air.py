@@ -67,12 +67,13 @@ def squeeze(
         rows[state + AIR_STATE.ahead],
     )
     on, exponent = fixed[effects + AIR.flow], fixed[effects + AIR.polytropic]
-    own = scratch(3, LANES)
-    ratio, volume, rise = own[0], own[1], own[2]
+    own = scratch(4, LANES)
+    ratio, volume, per_volume, rise = own[0], own[1], own[2], own[3]
     for j in range(LANES):
         most = max(LEAST_VOLUME, here[j])
         volume[j] = max(0.5 * most, most + share * gives[j] * ahead[j])
-        ratio[j] = (space[j] if space[j] > 0.0 else most) / volume[j]
+        per_volume[j] = 1.0 / volume[j]
+        ratio[j] = (space[j] if space[j] > 0.0 else most) * per_volume[j]
     if count_on(exponent, 1.0) > 0:
         for j in range(LANES):
             ratio[j] = ratio[j] * power_of_ratio(ratio[j], exponent[j] - 1.0)
@@ -80,7 +81,7 @@ def squeeze(
         before = regulated[j] + ATMOSPHERE
         change[j] = before * (ratio[j] - 1.0) if on[j] > 0.0 else 0.0
         after = before + change[j]
-        rise[j] = exponent[j] * after * gives[j] / volume[j] if on[j] > 0.0 else 0.0
+        rise[j] = exponent[j] * after * gives[j] * per_volume[j] if on[j] > 0.0 else 0.0
     line, slope = rows[state + AIR_STATE.line], rows[state + AIR_STATE.slope]
     for j in range(LANES):
         regulated[j] = regulated[j] + change[j]
@@ -127,10 +128,12 @@ def flow_step(
     reached = found[0]
     for j in range(LANES):
         p, wide, per_band, b = regulated[j], dead[j], 1.0 / band[j], critical[j]
+        span = 1.0 / (1.0 - b)
         first = 1.0 - late[j] if older[j] >= 0.0 else 0.0
         last = late[j] if newer[j] >= 0.0 else 0.0
         goal, next_goal = gain[j] * older[j], gain[j] * newer[j]
         source = min(upstream[j], reservoir[j] - drop[j])
+        fed = source + ATMOSPHERE
         fills, empties = supply[j], supply[j] * share[j]
         # pressures that the valve cannot pass
         end = goal if first > 0.0 else p
@@ -140,11 +143,11 @@ def flow_step(
         rate = h * PRESSURE_PER_DENSITY / max(LEAST_VOLUME, space[j])
         opened = first * valve_opening(p, goal, wide, per_band)
         opened = opened + last * valve_opening(p, next_goal, wide, per_band)
-        middle = p + 0.5 * rate * inflow(opened, p, source + ATMOSPHERE, fills, empties, b)
+        middle = p + 0.5 * rate * inflow(opened, p, fed, fills, empties, b, span)
         middle = max(low, min(high, middle))
         opened = first * valve_opening(middle, goal, wide, per_band)
         opened = opened + last * valve_opening(middle, next_goal, wide, per_band)
-        after = p + rate * inflow(opened, middle, source + ATMOSPHERE, fills, empties, b)
+        after = p + rate * inflow(opened, middle, fed, fills, empties, b, span)
         after = max(low, min(high, after))
         reached[j] = after if on[j] > 0.0 else p
     if valve > 0:

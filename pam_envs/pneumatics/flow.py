@@ -85,18 +85,23 @@ def valve_opening(pressure: float, goal: float, dead: float, per_band: float) ->
 
 @kernel
 def inflow(
-    opened: float, pressure: float, source: float, supply: float, exhaust: float, critical: float
-) -> float:
+    opened: float, pressure: float, source: float, supply: float, exhaust: float, critical: float,
+    per_span: float,
+) -> float:  # fmt: skip
     """Return the flow [kg/s] into a muscle at a pressure [Pa]; negative: to the atmosphere.
 
     ``source`` is the absolute pressure [Pa] upstream, ``supply`` and ``exhaust`` are the
-    conductances [m3/(s Pa)].
+    conductances [m3/(s Pa)], ``per_span`` is ``1 / (1 - critical)``. The flow is that of
+    :func:`mass_flow`, in a form without division.
     """
     inside = pressure + ATMOSPHERE
     upstream = source if opened > 0.0 else inside
     downstream = inside if opened > 0.0 else ATMOSPHERE
     size = supply if opened > 0.0 else exhaust
-    return opened * mass_flow(upstream, downstream, size, critical)
+    beyond = max(0.0, downstream - critical * upstream)
+    span = upstream - critical * upstream
+    drop = math.sqrt(max(0.0, span * span - beyond * beyond))
+    return opened * (size * REFERENCE_DENSITY * per_span) * drop
 
 
 @kernel

@@ -27,7 +27,7 @@ from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rollout import loop_of, simulate
-from pam_envs.pneumatics.flow import SWITCH, mass_flow, power_of_ratio
+from pam_envs.pneumatics.flow import SWITCH, inflow, mass_flow, power_of_ratio
 from tests.envs.cases import IDS
 
 FLOW = {SWITCH: 1.0}
@@ -111,6 +111,19 @@ def test_power_of_ratio_is_accurate_within_a_quarter() -> None:
     for exponent in (0.1, 0.2, 0.4):
         found = [power_of_ratio(float(r), exponent) for r in ratios]
         np.testing.assert_allclose(found, ratios**exponent, rtol=2e-11)
+
+
+@pytest.mark.parametrize("critical", [0.0, 0.3, 0.6])
+def test_inflow_is_the_mass_flow_of_either_orifice(critical: float) -> None:
+    source, size, share = 8e5, 2e-10, 0.5
+    sizes = (size, share * size, critical, 1.0 / (1.0 - critical))
+    for p in np.linspace(0.0, 6.9e5, 40):
+        filling = mass_flow(source, p + ATMOSPHERE, size, critical)
+        assert inflow(1.0, p, source, *sizes) == pytest.approx(filling, rel=1e-12)
+        emptying = mass_flow(p + ATMOSPHERE, ATMOSPHERE, share * size, critical)
+        assert inflow(-0.5, p, source, *sizes) == pytest.approx(-0.5 * emptying, rel=1e-12)
+    assert inflow(1.0, 7.1e5, source, *sizes) == 0.0
+    assert inflow(-1.0, -1e4, source, *sizes) == 0.0
 
 
 def rates(plant: KneeOrthosis, set_point: float, volume: float) -> Callable[..., float]:
