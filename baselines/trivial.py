@@ -1,7 +1,5 @@
 """Constant and random actions in every environment: the lower bound of any comparison."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

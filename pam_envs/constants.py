@@ -1,7 +1,5 @@
 """Physical constants in SI units: one value of each for every plant, environment and test."""
 
-from __future__ import annotations
-
 GRAVITY = 9.80665
 """Standard acceleration of gravity [m/s2]."""
 ATMOSPHERE = 101325.0

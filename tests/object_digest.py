@@ -1,7 +1,5 @@
 """Digest of an object's complete content, for comparison of two objects."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import types

@@ -1,7 +1,5 @@
 """The command line from the user's side."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Shape of the source tree: sizes of folders, import circles."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from pathlib import Path

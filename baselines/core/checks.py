@@ -1,7 +1,5 @@
 """Check of the policy-predictor contract, also for third-party controllers."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -6,8 +6,6 @@ unchanged in ``evaluate_policy``, on one observation of shape (n_obs,) or on a b
 single observation); it is passed in and returned, and never changed in place.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar, final

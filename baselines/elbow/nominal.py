@@ -8,8 +8,6 @@ pressures, so that two linear equations give them exactly. For references out of
 has priority, and the stiffness is as near as possible (:mod:`pam_envs.mechanics`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple

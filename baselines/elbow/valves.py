@@ -13,8 +13,6 @@ error is at least half of the effect of a whole cycle: near empty, air leaves sl
 Each loop also gives the limits of the pressures at the end of its next step.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass

@@ -23,8 +23,6 @@ and joints. Signals are named ``angle``, ``set_point``, ``reference`` for one jo
 ``angle_k``, ``set_point_k``, ``joint_reference_k`` for a manipulator.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial

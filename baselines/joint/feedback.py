@@ -18,8 +18,6 @@ margins of the true arm.
 With preview, a loop tracks the reference later by its own delay (:mod:`baselines.joint.base`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, NamedTuple

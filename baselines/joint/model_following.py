@@ -19,8 +19,6 @@ angles that can be held, so that the model saturates as the joint does, and ``u_
 the disturbance loop receives the applied command (:mod:`baselines.joint.model`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple

@@ -10,8 +10,6 @@ In stance, and with the brace alone, the reference tension is tracked; in swing 
 the wire's torque on the knee.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal

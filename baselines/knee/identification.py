@@ -13,8 +13,6 @@ All of the paper's tests are without a leg: its angle controller would face 25 t
 its design.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Literal
 

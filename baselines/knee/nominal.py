@@ -7,8 +7,6 @@ stance and an angle in swing. The names and units of the signals determine which
 stiffness ``s`` becomes the reference tension ``s (L - L_min)`` at the sensed angle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -10,8 +10,6 @@ plant and its design (gain, one zero, bandwidth and control weight) reproduce th
 coefficients (:func:`refit_controller`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -12,8 +12,6 @@ Its zeros are the poles of the plant. Recovery needs a plant without zeros in th
 The bandwidth ``b`` is ``1/sqrt(mu)`` of the literature, in **rad/s**.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -13,8 +13,6 @@ the hold, and one of computing on a real rig. The environments have no computing
 applies from the instant of its observation), so that in simulation the whole period is margin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -8,8 +8,6 @@ and is counted. :func:`~pam_envs.mechanics.redundancy.resolution.resolve` plans 
 raises an error for such a pose.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

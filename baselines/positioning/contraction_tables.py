@@ -18,8 +18,6 @@ out in turn, at every load, on both branches. Pressures are clipped to the regul
 The published equations and those refitted to Table 6 used all five repeats.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial

@@ -22,8 +22,6 @@ limit and every early start. With an exact model the PID is at rest; it corrects
 wrong parameter or an undeclared load. (Two degrees of freedom with an internal model.)
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ Rows may have different loads: they are processed by load, and the model at a lo
 inverse, static curve) is prepared when that load first occurs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -24,8 +24,6 @@ then jumps by up to the width of the major loop (1 bar), up to 3 mm of contracti
 require a state of all extrema (:mod:`baselines.positioning.inverse`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, partial

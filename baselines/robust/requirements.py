@@ -35,8 +35,6 @@ design; behind it all of them are stable too, with peaks of 1.60 (2.12).
 Sources: packard1993; skogestad2005, chapter 8.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from functools import cache, cached_property

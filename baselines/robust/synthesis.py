@@ -25,8 +25,6 @@ The real gain is scaled as if it were complex (D instead of D, G scaling). For t
 ``mu`` with a real gain and the bound by SLICOT's AB13MD are reported.
 """
 
-from __future__ import annotations
-
 import json
 from importlib.metadata import version
 from pathlib import Path

@@ -7,8 +7,6 @@ may differ by 0.02 N m. ``k1`` is read as -0.21 + 4.41 mus per kPa; the printed 
 for comparison only. Hysteresis and sign change are inputs and therefore not judged.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Equations, tables and statements of the papers that are checked by themselves, without a run."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

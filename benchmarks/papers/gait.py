@@ -10,8 +10,6 @@ agreement with these figures is therefore no evidence. Their values with the pap
 stance only, are reported beside them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any

@@ -6,8 +6,6 @@ value within 5 %; a miss states its reason. Every feedback loop on the joint's a
 model-following, the disturbance loop) is evaluated with the same nominal plant in continuous time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache

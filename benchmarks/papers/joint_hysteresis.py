@@ -1,7 +1,5 @@
 """Hysteresis of a joint and its inverse: loop widths, symmetry, congruency (fluidic_muscles, 3)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from typing import Any

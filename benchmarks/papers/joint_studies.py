@@ -12,8 +12,6 @@ step and on a preceding turn; all combinations are evaluated, also on the plants
 hysteresis identified on the muscles; *paper* is the joint of two muscles that carries its link.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property

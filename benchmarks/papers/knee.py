@@ -6,8 +6,6 @@ reported), *dynamic* the printed plant over its static gain. An error is a root 
 half-range of the reference, without the first 2 s, the paper's transient.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -4,8 +4,6 @@
 here the plant is complete.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from typing import Any

@@ -6,8 +6,6 @@ other two paths were chosen to have the expected peaks, which are therefore inpu
 Freely drawn paths show the effect of the weight without any fit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache

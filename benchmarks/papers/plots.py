@@ -3,8 +3,6 @@
 yeh2010, Fig. 12 and 13; fluidic_muscles, Fig. 10 and 16.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

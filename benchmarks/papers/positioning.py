@@ -1,7 +1,5 @@
 """Figures of positioning2021: loop widths, simulated loops and positioning errors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

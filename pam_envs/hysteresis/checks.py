@@ -1,7 +1,5 @@
 """Checks of a hysteresis model's arguments: every message names value, bound and remedy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

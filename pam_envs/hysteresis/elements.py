@@ -5,8 +5,6 @@ of three exact numbers, so that a closed excursion of the input returns it to th
 incremental form ``clip(s + dx, -r, r)`` collects rounding errors.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar
 

@@ -12,8 +12,6 @@ An output is always computed from a stored turn, never accumulated: intermediate
 to a turn change no bit.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

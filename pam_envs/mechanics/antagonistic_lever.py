@@ -11,8 +11,6 @@ With ``r_u = r_o = r`` and ``l_u = l_o = l`` the lengths are
 bends, so that equal forces push it further out.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

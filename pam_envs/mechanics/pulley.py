@@ -6,8 +6,6 @@ Bundle b raises the angle, bundle a lowers it. Each has its nominal length at on
 range, where it is longest; beyond, stiff springs represent the mechanical stops.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

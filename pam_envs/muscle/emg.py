@@ -14,8 +14,6 @@ tau_w``; *B* takes the EMG to be a power ``n`` of the torque. They count from th
 level, so that one constant is enough.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -14,8 +14,6 @@ The volume is the one whose virtual work is the pressure's share of the force,
 counted from that of ideal braided muscles at their nominal length.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

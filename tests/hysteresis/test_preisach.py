@@ -1,7 +1,5 @@
 """Preisach operator: sum of relays, hysteresis properties, inverse."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

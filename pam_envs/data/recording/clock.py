@@ -1,7 +1,5 @@
 """Clock of a recording: gaps and jitter, and resampling to even steps."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

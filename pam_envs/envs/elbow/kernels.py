@@ -4,8 +4,6 @@ The model computations (estimates, references, allocation of pressures) use the 
 the readings, and neglect friction.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

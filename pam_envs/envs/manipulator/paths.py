@@ -1,7 +1,5 @@
 """Reference paths of a manipulator's tool, with planned joint angles."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -6,8 +6,6 @@ fluidic_muscles, section 2. The weight grows without bound towards the limits, s
 optimum within them is always found; the unweighted variant minimises ``q'q`` and has no limits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache

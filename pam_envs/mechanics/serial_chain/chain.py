@@ -9,8 +9,6 @@ These are textbook formulas, by Jacobians; the kernels of ``kinematics`` and ``d
 the same numbers recursively, for lanes side by side.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from functools import cached_property

@@ -3,8 +3,6 @@
 Every figure is asserted to the digits it is given with: half a unit of the last one is allowed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Bad input raises a clear error and leaves the environment unchanged."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Kernels of a family in the common step, with three carts that are pushed at once."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from types import SimpleNamespace
