@@ -36,8 +36,6 @@ Limits act on the command after the model loop: the loop itself is unlimited, an
 model, which receives the limited command, lags. Nothing winds up.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Callable
@@ -132,7 +130,7 @@ class JointModel:
         packed = tuple(part.reshape(*shape, *part.shape[1:]) for part in after)
         return self.slope * found.reshape(shape), packed
 
-    def narrowed(self, width: float) -> JointModel:
+    def narrowed(self, width: float) -> "JointModel":
         """Return the model with the hysteresis' width scaled, its tips unchanged; 0: a line."""
         if self.hysteresis is None or width == 0.0:
             return replace(self, hysteresis=None, slope=self.gain)

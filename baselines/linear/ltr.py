@@ -94,7 +94,7 @@ class LtrDesign:
 
 
 def design_ltr(
-    plant: StateSpace | RationalFit, bandwidth: float, control_weight: float
+    plant: "StateSpace | RationalFit", bandwidth: float, control_weight: float
 ) -> LtrDesign:
     """Return the controller of loop transfer recovery; see this module's page.
 

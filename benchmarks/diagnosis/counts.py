@@ -4,8 +4,6 @@ Pure functions of the records. Shares have exact (Clopper-Pearson) 95 % confiden
 ``upper`` is the one-sided 95 % bound. A failed run counts as wrong.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -47,7 +45,7 @@ class Answer:
     record: Mapping[str, Any]
 
     @classmethod
-    def of(cls, record: Mapping[str, Any]) -> Answer:
+    def of(cls, record: Mapping[str, Any]) -> "Answer":
         """Read a record."""
         case, failed = record["case"], bool(record["failure"])
         return cls(

@@ -5,8 +5,6 @@ inverse dynamics, the knee torque. The orthosis measures shoe forces and the lea
 computes Eq. (1) from them. Pace and centre of pressure vary from stride to stride.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -47,7 +45,7 @@ class GaitRecording:
         """Time [s] of the concatenated strides."""
         return np.asarray(np.arange(len(self.torque)) * PERIOD, np.float64)
 
-    def and_then(self, other: GaitRecording) -> GaitRecording:
+    def and_then(self, other: "GaitRecording") -> "GaitRecording":
         """Return this recording followed by another one of the same leg."""
         if self.leg != other.leg:
             raise ValueError("both recordings must be of one leg; record them with one plant")

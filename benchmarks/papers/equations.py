@@ -39,10 +39,8 @@ def brace() -> Iterator[Figure]:
     why = "cos2 is a misprint: Eq. (3) and virtual work have cos"
     yield Figure(name, 1.0 / cosine, "", where, expected=1.0, tolerance=1e-6, claim=words, why=why)
     printed = lever.stiffness * (NOMINAL - lever.relaxed_angle) / (lever.arm * cosine)
-    name, where = (
-        "tension without assistance as printed",
-        f"{KNEE}, section 3: tension for a torque",
-    )
+    name = "tension without assistance as printed"
+    where = f"{KNEE}, section 3: tension for a torque"
     why = "a sign: the wire is bent below its relaxed angle, kappa (theta_0 - theta) is meant"
     yield Figure(name, printed, "N", where, at_least=0.0, claim="shortening tension", why=why)
     name, where = "tension without assistance at 22 cm", f"{KNEE}, section 4.1: operating point"
@@ -109,10 +107,8 @@ def bundles() -> Iterator[Figure]:
     for share, place in ((24, "24 %"), (32, "28 and 32 %")):
         at = 0.01 * share * bundle(1).nominal_length
         ours = float(bundle(1).law(5e5, at) - bundle(1).law(0.0, at))
-        name, where = (
-            f"gain of force by filling at {share} %",
-            f"{ELBOW}, section 2: filling at {place}",
-        )
+        name = f"gain of force by filling at {share} %"
+        where = f"{ELBOW}, section 2: filling at {place}"
         words = "does not exceed its original size" if share == 24 else "a decrease"
         yield Figure(name, ours, "N", where, at_most=0.0, claim=words, why=ONE_END)
 
@@ -207,20 +203,16 @@ def table_statistics() -> Iterator[Figure]:
         where = f"{MUSCLE}, {place}"
         yield Figure(name, off, "mm", where, at_most=0.0061, claim=words)
         off = float(np.abs(readings.std(axis=1) - numbers(PRINTED_DEVIATIONS[load])).max())
-        name, words = (
-            f"{load:g} kg: largest difference of a printed deviation",
-            "Standard Deviation",
-        )
+        name = f"{load:g} kg: largest difference of a printed deviation"
+        words = "Standard Deviation"
         where += "; section 3.1.1: standard deviations" if load == 0.0 else ""
         note = "of a population: divided by 5, not by 4"
         yield Figure(name, off, "mm", where, at_most=1.1e-5, claim=words, note=note)
         inflated = table.branch(load, True)[1].mean(axis=1) / MM
         steps, tops = [*steps, *np.diff(inflated)], [*tops, float(inflated[-1])]
     least = float(min(steps))
-    name, where = (
-        "least change of contraction by 0.5 bar more",
-        f"{MUSCLE}, section 2.2: rule 2; Fig. 3",
-    )
+    name = "least change of contraction by 0.5 bar more"
+    where = f"{MUSCLE}, section 2.2: rule 2; Fig. 3"
     yield Figure(name, least, "mm", where, at_least=0.0, claim="will decrease")
     name, where = "the same, by the text of the method", "section 2.3: contraction and pressure"
     why = "the text has the sign of the length; the tables and Fig. 4 have that of the contraction"
@@ -232,10 +224,8 @@ def table_statistics() -> Iterator[Figure]:
     yield Figure(
         name, float(shape[0] * shape[1]), "1", where, expected=125.0, tolerance=0.0, note=note
     )
-    name, where = (
-        "contraction at 6 bar without load less the largest with one",
-        "section 4: largest",
-    )
+    name = "contraction at 6 bar without load less the largest with one"
+    where = "section 4: largest"
     words, where = "when the muscle is not loaded", f"{MUSCLE}, {where} contraction"
     yield Figure(name, tops[0] - max(tops[1:]), "mm", where, at_least=0.0, claim=words)
     name, where = "25 % of the length", f"{MUSCLE}, section 2.2: 25 %; Table 1"
@@ -244,10 +234,8 @@ def table_statistics() -> Iterator[Figure]:
     muscle = as_published(SingleMuscle.mas10("maxwell_slip")).muscle
     strain = np.linspace(0.0, 0.3, 301)
     force = np.asarray(muscle.tension(4e5, strain))
-    name, where = (
-        "largest change of force at 4 bar by 0.1 % more contraction",
-        f"{MUSCLE}, Fig. 3; section 2.2: rule 3",
-    )
+    name = "largest change of force at 4 bar by 0.1 % more contraction"
+    where = f"{MUSCLE}, Fig. 3; section 2.2: rule 3"
     words = "will shorten if its load is reduced"
     yield Figure(name, float(np.diff(force).max()), "N", where, at_most=0.0, claim=words)
     limit = float(np.interp(0.0, -np.asarray(muscle.tension(6e5, strain)), strain))

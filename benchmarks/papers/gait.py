@@ -141,10 +141,8 @@ def emg_reductions() -> Iterator[Figure]:
     for stride in (PAPER_STRIDE, NATURAL_STRIDE):
         yield from _estimator_errors(stride)
     ratio = estimator_error(NATURAL_STRIDE) / estimator_error(PAPER_STRIDE)
-    name, words = (
-        "error of Eq. (1) at natural pace over that at 5 s",
-        "no longer provides a good estimate",
-    )
+    name = "error of Eq. (1) at natural pace over that at 5 s"
+    words = "no longer provides a good estimate"
     text = note("predicted", "preset full balance of the leg", "RMS in stance")
     yield Figure(name, ratio, "", FASTER, note=text, at_least=1.0, claim=words)
 
@@ -257,10 +255,8 @@ def switching_transient() -> Iterator[Figure]:
         text = note("predicted", preset, "at the switch", other)
         yield figure(f"pressure jump {name}", jump, "kPa", note=text)
         errors.append(error)
-    name, text = (
-        "tension error with over without",
-        note("predicted", preset, "largest after the switch"),
-    )
+    name = "tension error with over without"
+    text = note("predicted", preset, "largest after the switch")
     words = "can die out quickly"
     yield figure(name, errors[0] / errors[1], note=text, at_most=1.0, claim=words)
 

@@ -255,10 +255,8 @@ def hysteresis_lines() -> Iterator[Figure]:
         for size in (10.0, 15.0, 20.0):
             name = f"{plant} joint, {size:g} deg: loop width without over with inverse"
             ratio = width_ratio(joint, np.radians(size))
-            where, words = (
-                f"{SOURCE}, section 3.2: width of the loop; Fig. 10",
-                "significant reduction",
-            )
+            where = f"{SOURCE}, section 3.2: width of the loop; Fig. 10"
+            words = "significant reduction"
             yield Figure(name, ratio, "", where, at_least=5.0, claim=words)
     where = f"{SOURCE}, Eq. (3.5)"
     exact, series = inverse_error()
@@ -268,10 +266,8 @@ def hysteresis_lines() -> Iterator[Figure]:
         "inverse by recursion", exact, "1", recursion, at_most=1e-12, note=text, claim=words
     )
     text = f"{text}; an independent program finds 1 % for another hysteresis"
-    words, why = (
-        "the unknown input",
-        "exact after one reversal; after more only if weights are even",
-    )
+    words = "the unknown input"
+    why = "exact after one reversal; after more only if weights are even"
     more = {"note": text, "at_most": 1e-12, "claim": words, "why": why}
     yield Figure("inverse (3.5) as printed", series, "1", where, **more)
     model, relays = inhomogeneous(), relay_output(inhomogeneous(), LEVELS)
@@ -283,15 +279,11 @@ def hysteresis_lines() -> Iterator[Figure]:
     yield Figure(name, off / scale, "1", where, note=text, at_most=1e-12, claim=words)
     where, words = f"{SOURCE}, section 3.1: antisymmetry", "f_ab = -f_ba"
     found_error = antisymmetry_error()
-    name, why = (
-        "error of f_ab = -f_ba over the range",
-        "right is E(b, a) = -E(a, b) of the map (3.2)",
-    )
+    name = "error of f_ab = -f_ba over the range"
+    why = "right is E(b, a) = -E(a, b) of the map (3.2)"
     yield Figure(name, found_error, "1", where, at_most=1e-12, claim=words, why=why)
-    name, where = (
-        "asymmetry of the joint's relay weights",
-        f"{SOURCE}, section 3.2: symmetric weights",
-    )
+    name = "asymmetry of the joint's relay weights"
+    where = f"{SOURCE}, section 3.2: symmetric weights"
     uneven = verdicts()["paper joint"].symmetry
     yield Figure(name, uneven, "1", where, at_most=SYMMETRY, claim="mu(a, b) = mu(-b, -a)")
     name, where = "3 % of the length over 25 % of stroke", f"{SOURCE}, section 1.1: 3 % and 10 %"
@@ -305,10 +297,8 @@ def disturbance_lines() -> Iterator[Figure]:
         title = f"2 deg off rejected to 10 %, {name}"
         yield near(title, rejection(name), "s", expected, why=why, source=where)
     ratio, words = rejection("joint_pi") / rejection(BEST), "significant reduction"
-    title, why = (
-        "time of the PI over that of the mu loop",
-        "robustness to +-35 % of gain costs speed",
-    )
+    title = "time of the PI over that of the mu loop"
+    why = "robustness to +-35 % of gain costs speed"
     yield Figure(title, ratio, "", where, at_least=1.0, claim=words, why=why)
 
 

@@ -190,10 +190,8 @@ def loop_shape() -> Iterator[Figure]:
     name, hz = "-3 dB of (11) on (10) in Hz", printed.bandwidth / (2.0 * np.pi)
     yield Figure(name, hz, "Hz", source, 26.2, 0.05, note(*as_printed), why=why)
     distance = np.abs(controller.zeros()[:, None] - plant.poles()[None, :]).min(axis=1)
-    name, words = (
-        "largest distance of a zero of (11) from a pole of (10)",
-        "is used to design the controllers",
-    )
+    name = "largest distance of a zero of (11) from a pole of (10)"
+    words = "is used to design the controllers"
     why = "LTR puts zeros of the controller at the poles of its plant: (11) was designed on another"
     source, far = f"{SOURCE}, {loop}", float(distance.max())
     text = note(*as_printed)
@@ -248,10 +246,8 @@ def tension_feedback() -> Iterator[Figure]:
     name, where = "LTR + inverse over LTR alone", f"{SOURCE}, abstract: inverse improves LTR"
     words = "better tracking performance"
     yield Figure(name, 1.0 / over_none, "", where, note=text, at_most=1.0, claim=words)
-    name, where = (
-        "LTR, 0.5 bar over no hysteresis",
-        f"{SOURCE}, abstract: hysteresis deteriorates control",
-    )
+    name = "LTR, 0.5 bar over no hysteresis"
+    where = f"{SOURCE}, abstract: hysteresis deteriorates control"
     ratio = errors[-1].feedback / errors[0].feedback
     yield Figure(name, ratio, "", where, note=text, at_least=1.0, claim="deteriorates")
     name = "LTR + straight line over LTR + inverse"
@@ -310,10 +306,8 @@ def bumpless_inequality() -> Iterator[Figure]:
         "the slowest pole decays at 4.055 1/s",
         BEFORE,
     )
-    name, where = (
-        "largest decay of the printed K, L",
-        f"{SOURCE}, section 4.2: K and L; Eq. (12); Eq. (13)",
-    )
+    name = "largest decay of the printed K, L"
+    where = f"{SOURCE}, section 4.2: K and L; Eq. (12); Eq. (13)"
     yield Figure(name, fastest, "1/s", where, note=text, expected=4.05, tolerance=0.0)
 
 

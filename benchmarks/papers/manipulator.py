@@ -194,10 +194,8 @@ def _conditions() -> Iterator[Figure]:
     constraint = numeric_jacobian(q)
     free = np.linalg.svd(constraint)[2][5:]
     left = float(np.abs(free @ slope).max() / np.abs(slope).max())
-    name, where = (
-        "path_3: slope of the cost along the free direction",
-        f"{SOURCE}, Eq. (2.2); Eq. (2.7)",
-    )
+    name = "path_3: slope of the cost along the free direction"
+    where = f"{SOURCE}, Eq. (2.2); Eq. (2.7)"
     yield Figure(name, left, "of largest", where, at_most=1e-6, claim="local extremum")
     name, where = "redundant degrees of freedom", f"{SOURCE}, section 2: one redundant DOF"
     yield Figure(name, float(6 - np.linalg.matrix_rank(constraint)), "1", where, 1.0, 0.0)

@@ -110,10 +110,8 @@ def positioning_errors() -> Iterator[Figure]:
             yield Figure(f"{name}: {what}", MM * value, "mm", where, **more)  # type: ignore[arg-type]
     without = table["one cubic for both branches"].rms
     ratio, words = table["published"].rms / without, "increase positioning accuracy"
-    name, why = (
-        "Eqs. (7) to (12) over one cubic without hysteresis, RMS",
-        "Eq. (11) as printed: 4.0 mm RMS",
-    )
+    name = "Eqs. (7) to (12) over one cubic without hysteresis, RMS"
+    why = "Eq. (11) as printed: 4.0 mm RMS"
     yield Figure(name, ratio, "", where, at_most=1.0, claim=words, why=why)
     ratio = without / table["pchip"].rms
     where = f"{SOURCE}, section 4: inverse model"

@@ -13,8 +13,6 @@
 Every key but ``plant`` may be missing.
 """
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import hashlib
@@ -156,7 +154,7 @@ class Rig:
             )
 
     @classmethod
-    def from_yaml(cls, path: str | Path) -> Rig:
+    def from_yaml(cls, path: str | Path) -> "Rig":
         """Read a rig file.
 
         Raises

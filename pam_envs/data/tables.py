@@ -9,8 +9,6 @@ before each reading. Hysteresis makes a reading depend on those before it: the a
 order.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from importlib import resources
 from pathlib import Path
@@ -114,7 +112,7 @@ class ContractionTable:
         part = slice(None, top + 1) if inflating else slice(top, None)
         return pressure[part], contraction[part]
 
-    def without_repeat(self, repeat: int) -> ContractionTable:
+    def without_repeat(self, repeat: int) -> "ContractionTable":
         """Return the table without one repeat of every load; ValueError without it or others."""
         kept = self.repeat != repeat
         if kept.all() or not kept.any():

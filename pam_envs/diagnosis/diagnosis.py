@@ -1,7 +1,5 @@
 """Diagnose model error from a recording; extend the plant; quantify the improvement."""
 
-from __future__ import annotations
-
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -192,7 +190,7 @@ class Study:
     loop_reason: str | None = "it was not requested"
 
     @classmethod
-    def begin(cls, recording: Recording, sheet: Rig, plant: SingleMuscle, floor: Floor) -> Study:
+    def begin(cls, recording: Recording, sheet: Rig, plant: SingleMuscle, floor: Floor) -> "Study":
         """Fit the base parameters of a plant to a recording."""
         family = MuscleFamily(plant, inputs_of(recording, sheet))
         measured = np.full((len(family.channels), len(recording.time)), np.nan)

@@ -302,12 +302,10 @@ def _list_leaving(
 
     Row 1 of ``leaving`` is 1 for a lane that continues along its branch.
     """
-    present, turn, bound, cell = (
-        rows[at + PRESENT],
-        rows[at + TURN],
-        rows[at + BOUND],
-        rows[at + CELL],
-    )
+    present = rows[at + PRESENT]
+    turn = rows[at + TURN]
+    bound = rows[at + BOUND]
+    cell = rows[at + CELL]
     staying = 0
     for j in range(first, last):
         held = _held(x[j], low[j], high[j])

@@ -15,8 +15,6 @@ References: yeh2010, section 3; T.-J. Yeh, S.-W. Lu, T.-Y. Wu, "Modeling and ide
 hysteresis in piezoelectric actuators", J. Dyn. Sys., Meas., Control 128 (2006).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -367,7 +365,7 @@ class ModifiedMaxwellSlip(ParallelElements, HysteresisModel):
         """Return the pressures, shape (T,), for stiffnesses of shape (T,), and the last state."""
         return self._record(stiffness, state, True)
 
-    def scaled(self, width: float, slope: float | None = None) -> ModifiedMaxwellSlip:
+    def scaled(self, width: float, slope: float | None = None) -> "ModifiedMaxwellSlip":
         """Return this model with its hysteresis ``width`` times as wide, 0 for none.
 
         The spring takes over the pressure of the elements at the tips of the major loop; the tips

@@ -9,8 +9,6 @@ A model is one class in one file of this folder, marked :func:`register`. It off
 - a record for plant files, and a preset that resembles a reference model.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -264,7 +262,7 @@ class HysteresisModel:
     @classmethod
     def resembling(
         cls, reference: Any, low: float, high: float, levels: int, start: Start
-    ) -> HysteresisModel | None:
+    ) -> "HysteresisModel | None":
         """Return the model of this kind nearest to a reference model, for inputs low to high."""
         raise NotImplementedError
 

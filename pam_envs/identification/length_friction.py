@@ -8,8 +8,6 @@ readings do not determine follows from a prior: elements of equal slip force, an
 change little from element to element and from cell to cell.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 
@@ -47,7 +45,7 @@ class Columns:
     stiffnesses: Array
 
     @classmethod
-    def of(cls, vectors: Array, cells: int) -> Columns:
+    def of(cls, vectors: Array, cells: int) -> "Columns":
         """Return the sets of vectors of the fit, shape (q, 8 + n cells)."""
         made = np.exp(vectors[:, len(_START) :]).reshape(len(vectors), len(THRESHOLDS), cells)
         return cls(vectors[:, : len(_START)], made)

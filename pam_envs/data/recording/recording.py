@@ -6,8 +6,6 @@
 :func:`read_input` also takes settled readings without time, see :mod:`pam_envs.data.tables`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 from collections.abc import Sequence
@@ -136,7 +134,7 @@ class Recording:
     filled: Flags
     row: Indices
     notes: tuple[str, ...] = ()
-    raw: Recording | None = dataclasses.field(default=None, repr=False)
+    raw: "Recording | None" = dataclasses.field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -160,7 +158,7 @@ class Recording:
         force: ArrayLike | None = None,
         valve_closed: Sequence[str] = (),
         source: str = "arrays",
-    ) -> Recording:
+    ) -> "Recording":
         """Make a recording of arrays in SI, checked as a file is.
 
         Parameters

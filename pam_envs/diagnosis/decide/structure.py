@@ -3,8 +3,6 @@
 None of this names a cause; it shows whether anything is left to explain.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -43,7 +41,7 @@ class Regressors:
         outputs: Array,
         load: Array,
         temperature: Array | None,
-    ) -> Regressors:
+    ) -> "Regressors":
         """Return the regressors of a recording and the simulated outputs (2, T)."""
         x, p = outputs
         period = float(time[1] - time[0])

@@ -4,8 +4,6 @@ Loads, pressures, a closed valve and a warmer muscle are proposed only if the re
 the rig has them; no experiment exceeds the recorded loads and the largest recorded command.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -32,7 +30,7 @@ class Means:
     warm: bool  # the muscle's temperature is measured
 
     @classmethod
-    def of(cls, recording: Recording, rig: Rig) -> Means:
+    def of(cls, recording: Recording, rig: Rig) -> "Means":
         """Return the capabilities that a recording shows."""
         return cls(
             full=float(recording.command.max()),

@@ -1,7 +1,5 @@
 """Quantities of a report, and time series in display units: spans, windows, envelopes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -61,7 +59,7 @@ class View:
         return [self.measured[channel] - model[channel] for model in models]
 
     @classmethod
-    def of(cls, traces: Any) -> View:
+    def of(cls, traces: Any) -> "View":
         """Convert the time series of a diagnosis from SI to display units."""
         segment = np.asarray(traces.segment, dtype=np.int64)
         command = _optional(traces.command)

@@ -1,7 +1,5 @@
 """Blocks of time that are held out in turn, and gains between models on them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +19,7 @@ class Blocks:
     counts: Array  # (channels, n): number of readings in each block
 
     @classmethod
-    def make(cls, time: Array, measured: Array) -> Blocks:
+    def make(cls, time: Array, measured: Array) -> "Blocks":
         """Divide a record into blocks, every third one held out."""
         of = ((time - time[0]) / BLOCK_SECONDS + 1e-9).astype(np.int64)
         n = int(of.max()) + 1

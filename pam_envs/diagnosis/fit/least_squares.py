@@ -6,8 +6,6 @@ base) and differ in a few more (a cause) share the base's Jacobian, computed onc
 optimum: near it the steps are close to Gauss-Newton, at a tenth of the simulations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -98,7 +96,7 @@ class Fit:
     begins: dict[Any, Any] = field(default_factory=dict, repr=False)  # starting points by form
 
     @classmethod
-    def at_start(cls, frees: tuple[Free, ...], column: Array) -> Fit:
+    def at_start(cls, frees: tuple[Free, ...], column: Array) -> "Fit":
         """Return a fit at the starting values of its parameters."""
         return cls(frees, np.array([f.inner(f.start) for f in frees]), column)
 

@@ -1,7 +1,5 @@
 """Single muscle as a diagnosable plant: recorded inputs, base parameters, parameter columns."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -69,7 +67,7 @@ class MuscleFamily:
     scales = (1e-3, 1e5)
     units = ("mm", "bar")
 
-    def finer(self, step: float) -> MuscleFamily:
+    def finer(self, step: float) -> "MuscleFamily":
         """Return the family with another longest sub-step of the simulation [s]."""
         return dataclasses.replace(self, inputs=dataclasses.replace(self.inputs, longest_step=step))
 

@@ -6,8 +6,6 @@ dampings of few fits instead). A model with a term also starts from the optimum 
 not fit worse; this is checked, since a failed optimiser must not count as evidence.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -45,7 +43,7 @@ class Fit:
         """Return the fit to all data (the first lane)."""
         return _named(self.numbers, self.theta[:1])
 
-    def first(self, n: int) -> Fit:
+    def first(self, n: int) -> "Fit":
         """Return the first ``n`` lanes."""
         return Fit(self.terms, self.theta[:n], self.cost[:n])
 

@@ -1,5 +1,7 @@
 """View of the elbow orthosis: arm, bundles, object, reachable torque and stiffness."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

@@ -1,5 +1,7 @@
 """View of an antagonistic joint: lever, both muscles, reference, disturbance."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Views of the knee orthosis: leg, brace, muscle, torques, phase of the stride."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

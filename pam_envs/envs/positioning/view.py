@@ -1,5 +1,7 @@
 """View of a muscle that lifts a hanging load."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 
