@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from baselines.positioning import contraction_tables as curves
-from benchmarks.papers import positioning as published
-from benchmarks.papers.equations import PRINTED_DEVIATIONS, PRINTED_MEANS, numbers
 from pam_envs.data.tables import BAR, MM, load_contraction_table
 
 TABLE = load_contraction_table()
@@ -46,33 +44,12 @@ def _mean_loop(load: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return pressure / BAR, inflated.mean(axis=1) / MM, deflated.mean(axis=1) / MM
 
 
-@pytest.mark.parametrize("load", TABLE.loads)
-def test_printed_means_recompute_to_6_micrometres(load):
-    _, mean = TABLE.means(load)
-    np.testing.assert_allclose(mean / MM, numbers(PRINTED_MEANS[load]), rtol=0, atol=0.0061)
-
-
-@pytest.mark.parametrize("load", TABLE.loads)
-def test_printed_deviations_are_of_a_population(load):
-    readings, printed = TABLE.cycles(load)[1] / MM, numbers(PRINTED_DEVIATIONS[load])
-    np.testing.assert_allclose(readings.std(axis=1), printed, rtol=0, atol=1.01e-5)
-    sample = readings.std(axis=1, ddof=1)[1:] / printed[1:]
-    np.testing.assert_allclose(sample, np.sqrt(5 / 4), rtol=3e-4)
-
-
 @pytest.mark.parametrize(
-    ("load", "width", "at", "share", "area"),
-    [
-        (0.0, 3.290, 3.5, 0.218, 11.58),
-        (2.55, 2.820, 4.5, 0.191, 10.39),
-        (4.55, 2.400, 3.5, 0.171, 8.00),
-    ],
+    ("load", "share", "area"), [(0.0, 0.218, 11.58), (2.55, 0.191, 10.39), (4.55, 0.171, 8.00)]
 )
-def test_widest_loops_are_as_published(load, width, at, share, area):
+def test_loops_have_the_published_share_of_the_stroke_and_area(load, share, area):
     pressure, inflated, deflated = _mean_loop(load)
     wide = deflated - inflated
-    assert wide.max() == pytest.approx(width, abs=1e-9)
-    assert pressure[wide.argmax()] == at
     assert wide.max() / inflated[-1] == pytest.approx(share, abs=0.5e-3)
     assert np.trapezoid(wide, pressure) == pytest.approx(area, abs=0.0051)
 
@@ -179,20 +156,14 @@ def test_two_more_entries_of_table_6_are_suspect(contraction, printed, read):
     assert curves.TABLE_6_PRESSURE[0, 1, row] == printed
 
 
-POSITIONING = published.POSITIONING | {"table 6 refit, corrected": (0.196, 0.743)}
-"""RMS and largest positioning error [mm] on the tables' own repeats; with 2.05 bar in Table 6 in
-place of 1.43 bar, as the paper fitted it."""
-
-
 @pytest.fixture(scope="module")
 def positioning():
     return curves.positioning_error_table(TABLE)
 
 
-@pytest.mark.parametrize("inverse", POSITIONING)
-def test_positioning_errors(positioning, inverse):
-    found = positioning[inverse]
-    assert [found.rms / MM, found.largest / MM] == pytest.approx(POSITIONING[inverse], abs=MILLI)
+def test_positioning_errors_of_the_corrected_table_6(positioning):
+    found = positioning["table 6 refit, corrected"]
+    assert [found.rms / MM, found.largest / MM] == pytest.approx([0.196, 0.743], abs=MILLI)
 
 
 def test_positioning_errors_by_published_equation(positioning):
