@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from baselines.joint.model import POLE, pi_system, pole_cancelling
 from baselines.linear import ltr
-from baselines.linear.systems import discrete, double_lag, response
+from baselines.linear.systems import StateSpace, discrete, double_lag, response
 from baselines.robust.requirements import FREQUENCIES, RobustDesign, robust_controller, sensitivity
 from benchmarks.papers.joint_hysteresis import (
     antisymmetry_error,
@@ -106,15 +106,19 @@ def near(
     return Figure(name, ours, unit, tolerance=band, expected=expected, **words)
 
 
-def nominal_step() -> tuple[Array, Array]:
-    """Return times [s] and the step response of the nominal plant with the PI."""
-    loop = double_lag(POLE) * pi_system(pole_cancelling())
-    fine = discrete(loop.feedback(), 1e-4, "zoh")
+def unit_step(system: StateSpace, seconds: float) -> tuple[Array, Array]:
+    """Return times [s] and the step response of a continuous system."""
+    fine = discrete(system, 1e-4, "zoh")
     state, outputs = fine.initial_state(), []
-    for _ in range(20000):
+    for _ in range(round(seconds / 1e-4)):
         state = fine.advance(1.0, state)
         outputs.append(float(fine.output(1.0, state)))
     return 1e-4 * np.arange(1.0, len(outputs) + 1.0), np.array(outputs)
+
+
+def nominal_step() -> tuple[Array, Array]:
+    """Return times [s] and the step response of the nominal plant with the PI."""
+    return unit_step((double_lag(POLE) * pi_system(pole_cancelling())).feedback(), 2.0)
 
 
 def pi_figures() -> Iterator[Figure]:
@@ -136,12 +140,7 @@ def pi_figures() -> Iterator[Figure]:
     yield near("PI: rise on the coarse samples", rise, "s", 0.1274, EXACT, note=text)
     yield near("PI: settling to 2 %", exact.settling, "s", 0.370, EXACT)
     yield near("PI: phase margin", float(margin), "deg", 65.5, EXACT)
-    plant = discrete(double_lag(POLE), 1e-4, "zoh")
-    state, outputs = plant.initial_state(), []
-    for _ in range(10000):
-        state = plant.advance(1.0, state)
-        outputs.append(float(plant.output(1.0, state)))
-    alone = step_figures(1e-4 * np.arange(1.0, 10001.0), np.array(outputs)).rise
+    alone = step_figures(*unit_step(double_lag(POLE), 1.0)).rise
     where = f"{SOURCE}, Fig. 12; section 4: poles"
     yield near("rise of the double pole", alone, "s", 0.1456, EXACT, source=where)
     why = "a sign: poles at +23 rad/s would be unstable, -23 rad/s is meant"

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter, lfilter_zi
 
 from baselines.knee import published
 from baselines.linear.bumpless import SMALLEST, certificate
@@ -81,11 +82,8 @@ def _lagged(signal: Array, lag: float, step: float) -> Array:
     """Return the output of a first-order lag for an input that is linear between samples."""
     keep = float(np.exp(-step / lag))
     slope = lag / step * (1.0 - keep)
-    out = np.empty_like(signal)
-    out[0] = signal[0]
-    for i in range(1, len(signal)):
-        out[i] = keep * out[i - 1] + (slope - keep) * signal[i - 1] + (1.0 - slope) * signal[i]
-    return out
+    forward, back = [1.0 - slope, slope - keep], [1.0, -keep]
+    return np.asarray(lfilter(forward, back, signal, zi=signal[:1] * lfilter_zi(forward, back))[0])
 
 
 @dataclass(frozen=True)
