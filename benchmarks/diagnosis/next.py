@@ -31,7 +31,9 @@ def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:
     plan = {p.name: p for p in plans(means)}[plan_name]
     before = made.ground.campaign
     extra = _campaign(plan, before)
-    whole = _joined(before, extra)
+    names = ("command_bar", "segment", "load_N", "temperature_C", "valve_closed")
+    both: Any = {n: np.concatenate([getattr(before, n), getattr(extra, n)]) for n in names}
+    whole = replace(before, **both)
     sheet = sheet_of(made.ground.base, whole, case.noise)
     if plan.name in FRESH:  # time restarts in the second recording
         runs = [(made.effects, before), (made.effects, extra)]
@@ -61,12 +63,6 @@ def _campaign(plan: Plan, before: hidden.Campaign) -> hidden.Campaign:
         shut,
         before.period,
     )
-
-
-def _joined(first: hidden.Campaign, second: hidden.Campaign) -> hidden.Campaign:
-    names = ("command_bar", "segment", "load_N", "temperature_C", "valve_closed")
-    both: Any = {n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in names}
-    return replace(first, **both)
 
 
 def _sooner(effect: hidden.Effect, share: float) -> hidden.Effect:

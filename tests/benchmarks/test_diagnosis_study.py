@@ -241,16 +241,12 @@ def test_traces_are_compared_on_the_output_with_the_largest_effect():
     assert errors["creep"]["found_raw"] > 4.0
 
 
-def made_rig(name: str) -> Any:
+@pytest.mark.parametrize("name", ["creep", "dead_time", "sensor_delay"])
+def test_oracle_equals_the_driven_rig_without_noise(name):
     effect = hidden.draw_effect(name, np.random.default_rng(1))
     base = hidden.draw_base(np.random.default_rng(3))
     ground = SimpleNamespace(base=base)
-    return SimpleNamespace(ground=ground, effects=[(effect, 3.0)], noise=NOISE)
-
-
-@pytest.mark.parametrize("name", ["creep", "dead_time", "sensor_delay"])
-def test_oracle_equals_the_driven_rig_without_noise(name):
-    made = made_rig(name)
+    made = SimpleNamespace(ground=ground, effects=[(effect, 3.0)], noise=NOISE)
     rig, oracle = DrivenRig(made, 30.0, 24.0), OracleRig(made, 30.0, 24.0)
     commands = np.repeat(np.random.default_rng(0).uniform(0.0, 5e5, 6), 30)
     ahead = oracle.try_ahead(np.stack([commands, 0.5 * commands], axis=1), len(commands))
