@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from pam_envs.kernels.build import interpreted
-from pam_envs.mechanics.redundancy import resolution as redundancy
 from pam_envs.mechanics.redundancy.newton import (
     across,
     bends_upwards,
-    resolve_path,
     set_curvature,
     set_equations,
     slope_and_curvature,
@@ -17,7 +15,6 @@ from pam_envs.mechanics.redundancy.newton import (
 )
 from pam_envs.mechanics.redundancy.resolution import (
     LIMIT,
-    Resolution,
     UnreachablePose,
     nearest,
     resolve,
@@ -286,22 +283,3 @@ def test_invalid_arguments_are_refused(arguments, words):
 
 
 # --- compiled and not ---------------------------------------------------------------------------
-
-
-def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let kernels run as plain Python."""
-    monkeypatch.setattr(redundancy, "COMPILED", False)
-    monkeypatch.setattr(
-        redundancy, "_built", lambda n: interpreted(resolve_path, {"N_STAGES": n, "LANES": 1})
-    )
-
-
-def test_compiled_and_uncompiled_give_the_same_bits(monkeypatch):
-    poses = ARM.pose(joint_line(START, END, 7))
-    built: list[Resolution] = [resolve(ARM, poses, weighted=w) for w in (True, False)]
-    uncompiled(monkeypatch)
-    for weighted, one in zip((True, False), built, strict=True):
-        plain = resolve(ARM, poses, weighted=weighted)
-        np.testing.assert_array_equal(plain.angles, one.angles)
-        np.testing.assert_array_equal(plain.multipliers, one.multipliers)
-        np.testing.assert_array_equal(plain.iterations, one.iterations)
