@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from pam_envs.kernels.build import interpreted
+from pam_envs.mechanics.redundancy import resolution as redundancy
 from pam_envs.mechanics.redundancy.newton import (
     across,
     bends_upwards,
+    resolve_path,
     set_curvature,
     set_equations,
     slope_and_curvature,
@@ -283,3 +285,11 @@ def test_invalid_arguments_are_refused(arguments, words):
 
 
 # --- compiled and not ---------------------------------------------------------------------------
+
+
+def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let kernels run as plain Python."""
+    monkeypatch.setattr(redundancy, "COMPILED", False)
+    monkeypatch.setattr(
+        redundancy, "_built", lambda n: interpreted(resolve_path, {"N_STAGES": n, "LANES": 1})
+    )
