@@ -91,13 +91,6 @@ def test_errors_of_refitted_forward_equations(equation):
         assert _forward_errors(refit)[equation - 1][:2] == pytest.approx(residuals, abs=MILLI)
 
 
-def test_equation_3_is_a_copy_of_equation_1_and_its_refit_has_the_claimed_determination():
-    printed = curves.PUBLISHED_FORWARD
-    np.testing.assert_array_equal(printed[1, 0], printed[0, 0])
-    refit = _forward_errors(curves.fitted_forward(TABLE))
-    assert refit[2][2] == pytest.approx(0.997, abs=5e-4)
-
-
 def test_equation_5_fits_up_to_4_bar_and_is_low_above():
     pressure, inflated, _ = _mean_loop(4.55)
     error = np.polyval(curves.PUBLISHED_FORWARD[2, 0], pressure) - inflated
