@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Controller
+from baselines.core.controller import Controller
+from pam_envs.arrays import Array
 from pam_envs.parameters import Signals
 
 

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple, Protocol, TypeVar, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.parameters import Signal, Signals
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 Prediction = tuple[NDArray[np.float32], Any]
 S = TypeVar("S", bound=tuple[Any, ...])

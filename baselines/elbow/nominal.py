@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import Array, Reader, encode_actions, reader
+from baselines.core.controller import Reader, encode_actions, reader
 from baselines.core.entry import ELBOW, Entry, Spec
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.mechanics.allocation import allocate
 from pam_envs.parameters import Signal

@@ -46,7 +46,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from baselines.core.controller import Array
 from baselines.linear.bumpless import Bumpless, BumplessGains
 from baselines.linear.systems import (
     DiscreteSystem,
@@ -56,6 +55,7 @@ from baselines.linear.systems import (
     double_lag,
     state_space,
 )
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.identification.joint_forc import measure_joint

@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import Array, Reader, reader
+from baselines.core.controller import Reader, reader
 from baselines.core.entry import Spec
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 

@@ -36,8 +36,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cdf2rdf
 
-from baselines.core.controller import Array
 from baselines.linear.systems import DiscreteSystem, StateSpace, delayed, discrete, time_constant
+from pam_envs.arrays import Array
 
 SMALLEST = 1e-7
 """Distance from the inequality's bound that counts as feasible."""

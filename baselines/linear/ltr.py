@@ -20,7 +20,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.core.controller import Array
 from baselines.linear.systems import (
     Complex,
     DiscreteSystem,
@@ -30,6 +29,7 @@ from baselines.linear.systems import (
     state_space,
     time_constant,
 )
+from pam_envs.arrays import Array
 from pam_envs.identification.frequency import RationalFit
 
 Response = Callable[[NDArray[np.float64]], Complex]

@@ -20,8 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, RowController, encode_action
+from baselines.core.controller import Prediction, RowController, encode_action
 from baselines.core.entry import AS_DESIGNED, Bounds, Knobs
+from pam_envs.arrays import Array
 from pam_envs.parameters import Signal
 
 DELAY_PERIODS = 1.5

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from baselines.core.controller import Array
+from pam_envs.arrays import Array
 from pam_envs.data.tables import BAR, MM, ContractionTable, load_contraction_table
 
 Curve = Callable[[Array], Any]

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from baselines.core.controller import Array, by_load
+from baselines.core.controller import by_load
 from baselines.positioning.contraction_tables import LOADS
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.plants.single_muscle.plant import SingleMuscle

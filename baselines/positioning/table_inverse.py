@@ -33,7 +33,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import (
-    Array,
     Prediction,
     Reader,
     RowController,
@@ -51,6 +50,7 @@ from baselines.positioning.contraction_tables import (
     published_inverse,
     table_6_inverse,
 )
+from pam_envs.arrays import Array
 from pam_envs.data.tables import load_contraction_table
 from pam_envs.parameters import Signal
 

@@ -44,7 +44,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.core.controller import Array
 from baselines.linear.systems import (
     Complex,
     StateSpace,
@@ -53,6 +52,7 @@ from baselines.linear.systems import (
     response,
     state_space,
 )
+from pam_envs.arrays import Array
 
 FREQUENCIES = np.geomspace(1e-2, 1e3, 401)
 """Frequencies [rad/s] at which loops are evaluated."""

@@ -10,11 +10,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.mechanics.leg import Leg
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.knee_orthosis.rollout import simulate_knee
-
-Array = NDArray[np.float64]
 
 PERIOD = KneeOrthosis.control_period
 PACE_SPREAD = 0.06  # largest relative deviation of a stride's duration from the mean

@@ -8,6 +8,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.diagnosis.cases import NOISE, Case, Made, recording_of, sheet_of
+from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import BAR, MM, Rig
 from pam_envs.diagnosis.closed_loop.gain import DURATION
@@ -18,8 +19,6 @@ from tests.diagnosis.hidden.catalogue import constants
 from tests.diagnosis.hidden.kernel import begin, one_period
 from tests.diagnosis.hidden.records import STATE, blank
 from tests.diagnosis.hidden.rig import steps_in
-
-Array = NDArray[np.float64]
 
 FULL = 6.0  # largest pressure [bar] of the rigs
 FRESH = ("cycles_after_rest",)  # plans with a rested muscle, for which the rig is reset

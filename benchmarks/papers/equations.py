@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.positioning import contraction_tables as curves
 from benchmarks.papers.elbow import SOURCE as ELBOW
@@ -12,12 +11,11 @@ from benchmarks.papers.elbow import bundle
 from benchmarks.papers.joint import SOURCE as JOINT
 from benchmarks.papers.knee import SOURCE as KNEE
 from benchmarks.papers.published import BEFORE, Figure, Group, as_published
+from pam_envs.arrays import Array
 from pam_envs.data.tables import BAR, MM, load_contraction_table
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-Array = NDArray[np.float64]
 
 # --- knee orthosis ------------------------------------------------------------------------------
 

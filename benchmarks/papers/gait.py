@@ -15,7 +15,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.knee.published import printed_bumpless, printed_controller
 from baselines.linear.bumpless import make_bumpless
@@ -23,6 +22,7 @@ from baselines.linear.systems import discrete
 from benchmarks.papers.knee import PERIOD, SOURCE
 from benchmarks.papers.published import Figure, Group, as_published, note
 from benchmarks.scoring.group import rms
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.identification.emg_calibration import PUBLISHED, change, stride_torques
 from pam_envs.muscle.emg import MuscleActivation, Reading, calibration, emg_proxy
@@ -30,7 +30,6 @@ from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
 from pam_envs.plants.knee_orthosis.rollout import simulate_knee
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE
 
-Array = NDArray[np.float64]
 NAMES: dict[Activity, str] = {
     "walk": "walking",
     "stairs_up": "stairs up",

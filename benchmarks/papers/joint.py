@@ -40,10 +40,10 @@ from benchmarks.papers.joint_studies import (
     tracking_error,
 )
 from benchmarks.papers.published import BEFORE, Figure, Group, as_published
+from pam_envs.arrays import Array
 from pam_envs.identification.joint_forc import CONGRUENCY, SYMMETRY
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 SOURCE = "fluidic_muscles"

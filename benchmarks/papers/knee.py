@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter, lfilter_zi
 
 from baselines.knee import published
@@ -22,14 +21,13 @@ from baselines.linear.ltr import closed_loop_poles, design_ltr, loop_figures
 from baselines.linear.systems import discrete
 from benchmarks.papers.published import BEFORE, Figure, Group, note
 from benchmarks.scoring.group import rms
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.modified_maxwell_slip import even_model
 from pam_envs.identification.maxwell_slip_lp import (
     OpenParameters,
     fit_slip_programme,
     printed_programme,
 )
-
-Array = NDArray[np.float64]
 
 SOURCE = "yeh2010"
 PERIOD = 0.01

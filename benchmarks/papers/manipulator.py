@@ -12,16 +12,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.manipulator.redundancy import Comparison, compare
 from benchmarks.papers.published import BEFORE, Figure, Group
+from pam_envs.arrays import Array
 from pam_envs.envs.manipulator.paths import LEAP
 from pam_envs.mechanics.redundancy.resolution import LIMIT
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.references.path import PATHS, POINTS, PathEnds, draw_ends, joint_line
-
-Array = NDArray[np.float64]
 
 SOURCE = "fluidic_muscles"
 PLAN = f"{SOURCE}, Fig. 7; section 2: "

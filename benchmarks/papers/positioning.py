@@ -3,15 +3,13 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.positioning.contraction_tables import positioning_error_table
 from benchmarks.papers.published import BEFORE, Figure, Group, as_published
 from benchmarks.scenarios.scenario_env import make_env
+from pam_envs.arrays import Array
 from pam_envs.data.tables import load_contraction_table
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-Array = NDArray[np.float64]
 
 SOURCE = "positioning2021"
 MM, BAR = 1e3, 1e-5

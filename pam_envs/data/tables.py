@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.data.recording.columns import RecordingError, Sheet, read_sheet, refuse, rows_text
-
-Array = NDArray[np.float64]
 
 BAR = 1e5
 MM = 1e-3

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.audit.audit import audit
 from pam_envs.diagnosis.audit.noise import ChannelFloor, Floor, noise_floor
 from pam_envs.diagnosis.cause import Cause

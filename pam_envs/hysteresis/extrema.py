@@ -15,14 +15,10 @@ to a turn change no bit.
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.everett import everett
 from pam_envs.kernels.arithmetic import clip
 from pam_envs.kernels.build import LANES, entry, kernel, scratch
-
-Array = NDArray[np.float64]
 
 DEPTH = 24
 """Depth of the stack in the rows of a plant."""

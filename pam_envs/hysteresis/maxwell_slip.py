@@ -19,8 +19,9 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.checks import check_not_negative, check_thresholds, floats, width_of
 from pam_envs.hysteresis.elements import ParallelElements, plays_lag, plays_peek, plays_step
 from pam_envs.hysteresis.everett import play_table
@@ -34,8 +35,6 @@ from pam_envs.hysteresis.protocol import (
     Usage,
     register,
 )
-
-Array = NDArray[np.float64]
 
 
 @register

@@ -21,8 +21,9 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.checks import (
     check_not_negative,
     check_thresholds,
@@ -35,8 +36,6 @@ from pam_envs.hysteresis.elements import ParallelElements, play
 from pam_envs.hysteresis.everett import table_from_weights, weights_from_table
 from pam_envs.hysteresis.protocol import HysteresisModel, Kernels, Start, Usage, register
 from pam_envs.kernels.build import entry, kernel
-
-Array = NDArray[np.float64]
 
 FAR = 1e300
 MOST = 16

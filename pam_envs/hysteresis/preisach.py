@@ -20,6 +20,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis import everett as maps
 from pam_envs.hysteresis.checks import floats, series, width_of
 from pam_envs.hysteresis.extrema import (
@@ -41,8 +42,6 @@ from pam_envs.hysteresis.protocol import (
     padded,
     register,
 )
-
-Array = NDArray[np.float64]
 
 SMALLEST_WEIGHT = -1e-12
 """Relay weights down to this part of the largest Everett value count as rounding errors."""

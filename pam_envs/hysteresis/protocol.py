@@ -17,9 +17,9 @@ from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import LANES, kernel, scratch
 
-Array = NDArray[np.float64]
 Start = Literal["low", "virgin"]
 RowsState = tuple[NDArray[Any], ...]
 

@@ -23,8 +23,9 @@ from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.checks import check_not_negative, check_thresholds, floats, width_of
 from pam_envs.hysteresis.elements import THRESHOLD, WEIGHT, play
 from pam_envs.hysteresis.protocol import (
@@ -37,8 +38,6 @@ from pam_envs.hysteresis.protocol import (
     register,
 )
 from pam_envs.kernels.build import entry, kernel
-
-Array = NDArray[np.float64]
 
 LIMIT = ELEMENTS
 """Row of the state, after the sliders, with the factor on the thresholds: the plant writes it."""

@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.slip import PreisachSlip, SlipModel, StraightSlip
 from pam_envs.plants.single_muscle.hysteresis import Hysteresis
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-Array = NDArray[np.float64]
 
 THRESHOLDS = np.array([0.002, 0.004, 0.008, 0.014, 0.022, 0.035])
 """Strains at which the elements slip, at the limit 1; the readings are about 1 % apart."""

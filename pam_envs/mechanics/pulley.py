@@ -10,12 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed, published
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

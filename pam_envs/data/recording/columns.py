@@ -9,9 +9,9 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.wording import near
 
-Array = NDArray[np.float64]
 SHOWN = 5
 """Largest number of rows that a message names."""
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.data.recording import clock as clocks
 from pam_envs.data.recording.columns import (
     RecordingError,
@@ -39,7 +40,6 @@ __all__ = [
     "repeat_rows",
 ]
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 
 Source = Literal["repeats", "holds", "innovations", "declared"]
 

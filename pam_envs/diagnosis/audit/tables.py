@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 from scipy import stats
 
+from pam_envs.arrays import Array
 from pam_envs.data.tables import ContractionTable, one_path
-from pam_envs.diagnosis.arrays import Array
 
 MM = 1e-3
 SIGNIFICANT = 0.05

@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter
 from scipy.signal import lfilter, welch
 from scipy.stats import chi2
 
-from pam_envs.diagnosis.arrays import Array, Flags
+from pam_envs.arrays import Array, Flags
 from pam_envs.diagnosis.fit.blocks import Blocks
 
 BINS = 12

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import BAR, Rig
-from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.audit.audit import load_levels
 
 PERIOD = 0.02

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 
 CHANNELS = ("contraction", "pressure")
 UNITS = {"contraction": ("mm", 1e3), "pressure": ("bar", 1e-5)}

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array, Flags, Indices
+from pam_envs.arrays import Array, Flags, Indices
 
 BLOCK_SECONDS = 4.0  # length of the interleaved blocks [s]
 EVERY = 3  # period of the held-out blocks: every third one

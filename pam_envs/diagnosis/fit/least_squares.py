@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array, Flags, Indices
+from pam_envs.arrays import Array, Flags, Indices
 
 DAMPINGS = (1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
 """Levenberg-Marquardt dampings tried side by side, each in a lane of the replay."""

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.constants import CELSIUS, GRAVITY
-from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.parameters import declarations

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.models import Number, Term, lags_of, numbers_of, predict
 

@@ -15,12 +15,11 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.parameters import assumed
-
-Array = NDArray[np.float64]
 
 MOST_JOINTS = 12
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
