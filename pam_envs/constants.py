@@ -16,3 +16,5 @@ DENSITY_PER_PRESSURE = 1.0 / PRESSURE_PER_DENSITY
 """Density over absolute pressure of air at 20 degrees C [kg/(m3 Pa)]."""
 REFERENCE_DENSITY = 1.185
 """Density [kg/m3] of air in the reference state of ISO 8778: 20 degrees C and 1 bar."""
+BAR, MM = 1e5, 1e-3
+"""Bar [Pa] and millimetre [m], the units of files and messages."""

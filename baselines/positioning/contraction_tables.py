@@ -28,7 +28,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from pam_envs.arrays import Array
-from pam_envs.data.tables import BAR, MM, ContractionTable, load_contraction_table
+from pam_envs.constants import BAR, MM
+from pam_envs.data.tables import ContractionTable, load_contraction_table
 
 Curve = Callable[[Array], Any]
 

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.diagnosis.cases import NOISE, Case, Made, recording_of, sheet_of
 from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.recording import Recording
-from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.closed_loop.gain import DURATION
 from pam_envs.diagnosis.experiment.plans import Means, Plan, plans
 from pam_envs.plants.core.stepper import PERIOD

@@ -12,7 +12,8 @@ from benchmarks.papers.joint import SOURCE as JOINT
 from benchmarks.papers.knee import SOURCE as KNEE
 from benchmarks.papers.published import BEFORE, Figure, Group, as_published
 from pam_envs.arrays import Array
-from pam_envs.data.tables import BAR, MM, load_contraction_table
+from pam_envs.constants import BAR, MM
+from pam_envs.data.tables import load_contraction_table
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.single_muscle.plant import SingleMuscle

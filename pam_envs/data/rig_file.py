@@ -23,12 +23,10 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import yaml
 
+from pam_envs.constants import BAR, MM
 from pam_envs.wording import near
 
 Load = Literal["hanging_mass", "constant_force"]
-
-BAR = 1e5
-MM = 1e-3
 
 
 class Bounds(NamedTuple):

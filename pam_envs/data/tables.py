@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.columns import RecordingError, Sheet, read_sheet, refuse, rows_text
 
-BAR = 1e5
-MM = 1e-3
 LOAD_TOLERANCE = 1e-6
 """Two loads [kg] closer than this are the same load."""
 READINGS = ("load_kg", "pressure_bar", "direction", "repeat", "contraction_mm")

@@ -4,13 +4,9 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pam_envs.arrays import Array
+from pam_envs.arrays import Array, Flags, Indices
 from pam_envs.data.recording.columns import rows_text
-
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 SLOWEST = 0.2
 """Longest period [s] at which the motion of a muscle is still seen."""

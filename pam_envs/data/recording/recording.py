@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from pam_envs.arrays import Array
+from pam_envs.arrays import Array, Flags, Indices
+from pam_envs.constants import BAR, MM
 from pam_envs.data.recording import clock as clocks
 from pam_envs.data.recording.columns import (
     RecordingError,
@@ -25,7 +26,7 @@ from pam_envs.data.recording.columns import (
     refuse,
     rows_text,
 )
-from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.data.rig_file import Rig
 from pam_envs.data.tables import READINGS, ContractionTable, load_readings
 from pam_envs.wording import near
 
@@ -40,8 +41,6 @@ __all__ = [
     "repeat_rows",
 ]
 
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 COLUMNS = (
     "time_s",

@@ -6,9 +6,9 @@ import numpy as np
 from scipy import stats
 
 from pam_envs.arrays import Array
+from pam_envs.constants import MM
 from pam_envs.data.tables import ContractionTable, one_path
 
-MM = 1e-3
 SIGNIFICANT = 0.05
 TREND = 2.5  # absolute t value above which a trend over the repeats is reported
 FEW_LOADS = {

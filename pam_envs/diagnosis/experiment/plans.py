@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from pam_envs.arrays import Array
+from pam_envs.constants import BAR
 from pam_envs.data.recording.recording import Recording
-from pam_envs.data.rig_file import BAR, Rig
+from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import load_levels
 
 PERIOD = 0.02

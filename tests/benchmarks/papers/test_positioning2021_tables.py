@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from baselines.positioning import contraction_tables as curves
-from pam_envs.data.tables import BAR, MM, load_contraction_table
+from pam_envs.constants import BAR, MM
+from pam_envs.data.tables import load_contraction_table
 
 TABLE = load_contraction_table()
 MILLI = 0.5e-3 + 1e-9
