@@ -427,9 +427,7 @@ def diagnosis(
     from pam_envs.diagnosis.static.diagnosis import diagnose_readings
 
     folder = running.FOLDER if cells is None else cells
-    cases = (chosen, offset, kind, name, loops, next)
-    where = (computing.jobs, force, folder, computing.backend, computing.address)
-    options = running.Options(*cases, *where)
+    options = running.Options(chosen, offset, kind, name, loops, next, force, folder, computing)
     with progress("cases") as start:
         report = running.run(options, start)
     print(f"{report.computed} computed, {report.found} were there already")

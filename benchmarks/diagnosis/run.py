@@ -17,6 +17,7 @@ from benchmarks.diagnosis.cases import Case, cases
 from benchmarks.diagnosis.study import loops, promised, study
 from benchmarks.identity.hashing import digest
 from benchmarks.runs import provenance
+from benchmarks.runs.runner import Computing
 from benchmarks.runs.store import Store, read_record
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.causes import catalogue
@@ -27,6 +28,7 @@ from sweeps import engine
 HERE = Path(__file__).parents[1]
 FOLDER = HERE / ".cells" / "diagnosis"
 SHUFFLE = 20_260_101
+ONE_JOB = Computing(jobs=1)
 
 Study = Callable[[Case, Collection[str]], dict[str, Any]]
 Advance = Callable[[], None]
@@ -65,16 +67,9 @@ class Options:
     names: tuple[str, ...] = ()  # of hidden effects
     loops: int = 0  # number of cases of every cause that are run in closed loop
     next: bool = False  # carry out the proposed experiments
-    jobs: int = 1
     force: bool = False
     folder: Path = FOLDER
-    backend: str = "loky"
-    address: str = ""
-
-    @property
-    def cluster(self) -> engine.Cluster:
-        """Backend of the computation."""
-        return engine.Cluster(self.jobs, self.backend, self.address)
+    computing: Computing = ONE_JOB
 
     @property
     def whole(self) -> bool:
@@ -184,7 +179,7 @@ def _stage(
     report.found += len(tasks) - len(missing)
     if missing:
         advance = start(len(missing))
-        for _ in _computed(missing, store, options.cluster, act):
+        for _ in _computed(missing, store, options.computing.cluster, act):
             report.computed += 1
             advance()
     return {case: read_record(store.path(task.key)) for case, task in tasks.items()}

@@ -19,6 +19,7 @@ from benchmarks.diagnosis.next import DrivenRig, OracleRig
 from benchmarks.diagnosis.report import figures
 from benchmarks.diagnosis.run import Options, run, select
 from benchmarks.diagnosis.study import study, trace_errors
+from benchmarks.runs.runner import Computing
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
 from pam_envs.diagnosis.decide.rule import Rule
@@ -182,7 +183,9 @@ def deadly(case: Case, stages: Collection[str]) -> dict[str, Any]:
 def test_case_that_kills_its_worker_is_recorded_as_failed(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
     get_reusable_executor().shutdown(wait=True)
-    options = Options(kinds=("single",), names=("creep", "leak"), folder=tmp_path, jobs=2)
+    options = Options(
+        kinds=("single",), names=("creep", "leak"), folder=tmp_path, computing=Computing(jobs=2)
+    )
     report = run(options, act=deadly)
     get_reusable_executor().shutdown(wait=True)
     assert [bool(record["failure"]) for record in report.records] == [False, True]
