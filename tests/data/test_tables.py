@@ -62,6 +62,15 @@ def test_means_average_the_cycles(table):
     assert mean[pressure.argmax()] == pytest.approx(14.78e-3)
 
 
+def test_only_the_unloaded_muscle_drifts_over_the_repeats(table):
+    rates = []
+    for load in table.loads:
+        contraction = table.cycles(load)[1][1:]
+        rates.append(np.polyfit(np.arange(5), contraction.mean(axis=0), 1)[0])
+    assert rates[0] == pytest.approx(0.033e-3, abs=0.001e-3)
+    assert max(map(abs, rates[1:])) < 0.01e-3
+
+
 def test_heavier_load_contracts_less(table):
     """Averaged over a branch; single cells at 5.5 bar say otherwise by 0.3 mm, see PROVENANCE."""
     for inflating in (True, False):

@@ -201,6 +201,16 @@ def test_cost_of_the_regulated_loop_is_the_riccati_solutions():
         assert start @ cost @ start == pytest.approx(start @ riccati @ start, rel=1e-3)
 
 
+def test_margins_are_those_of_the_rational_loop():
+    plant, controller = PLANT, printed_controller()
+    gain, phase, distance, _, crossover, _ = control.stability_margins(plant * controller)
+    figures = loop_figures(lambda w: plant(1j * w) * controller(1j * w))
+    assert figures.gain_margin == pytest.approx(gain, rel=1e-6)
+    assert np.degrees(figures.phase_margin) == pytest.approx(phase, rel=1e-6)
+    assert figures.crossover == pytest.approx(crossover, rel=1e-6)
+    assert figures.peak_sensitivity == pytest.approx(1.0 / distance, rel=1e-6)
+
+
 def test_balanced_form_keeps_zeros_that_the_plain_companion_form_loses():
     exact = np.sort_complex(np.roots(CONTROLLER_NUMERATOR))
     plain = control.ss(control.tf(CONTROLLER_NUMERATOR, CONTROLLER_DENOMINATOR), method="scipy")

@@ -46,11 +46,18 @@ def _mean_loop(load: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("load", "share", "area"), [(0.0, 0.218, 11.58), (2.55, 0.191, 10.39), (4.55, 0.171, 8.00)]
+    ("load", "width", "at", "share", "area"),
+    [
+        (0.0, 3.290, 3.5, 0.218, 11.58),
+        (2.55, 2.820, 4.5, 0.191, 10.39),
+        (4.55, 2.400, 3.5, 0.171, 8.00),
+    ],
 )
-def test_loops_have_the_published_share_of_the_stroke_and_area(load, share, area):
+def test_widest_loops_are_as_published(load, width, at, share, area):
     pressure, inflated, deflated = _mean_loop(load)
     wide = deflated - inflated
+    assert wide.max() == pytest.approx(width, abs=1e-9)
+    assert pressure[wide.argmax()] == at
     assert wide.max() / inflated[-1] == pytest.approx(share, abs=0.5e-3)
     assert np.trapezoid(wide, pressure) == pytest.approx(area, abs=0.0051)
 
@@ -90,6 +97,11 @@ def test_errors_of_refitted_forward_equations(equation):
     np.testing.assert_allclose(found, coefficients, rtol=0, atol=MILLI)
     if residuals:
         assert _forward_errors(refit)[equation - 1][:2] == pytest.approx(residuals, abs=MILLI)
+
+
+def test_refit_of_equation_3_has_the_claimed_determination():
+    refit = _forward_errors(curves.fitted_forward(TABLE))
+    assert refit[2][2] == pytest.approx(0.997, abs=5e-4)
 
 
 def test_equation_5_fits_up_to_4_bar_and_is_low_above():

@@ -83,6 +83,11 @@ def test_both_plants_fit_the_same_frequency_response():
     assert np.max(np.abs(np.degrees(np.angle(ratio)))) < 5.0
 
 
+def test_printed_controller_is_no_design_on_the_printed_plant():
+    distance = np.abs(CONTROLLER.zeros()[:, None] - PLANT.poles()[None, :]).min(axis=1)
+    assert np.max(distance) > 10.0
+
+
 def test_26_2_hertz_is_not_credible():
     at_100_hz = np.array([200.0 * np.pi])
     needed = design_ltr(PLANT, 2.0 * np.pi * 26.2, 1e-14).controller(1j * at_100_hz)
