@@ -1,7 +1,5 @@
 """Constant and random actions in every environment: the lower bound of any comparison."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,10 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import Array, Prediction, RowController, encode_actions, row_count
+from baselines.core.controller import Prediction, RowController, encode_actions, row_count
 from baselines.core.entry import ELBOW, JOINT, KNEE, POSITIONING, Entry, Spec
 from baselines.joint.base import make_joint_signal_map
 from baselines.knee.published import NOMINAL_PRESSURE
+from pam_envs.arrays import Array
 from pam_envs.parameters import Signal
 
 Writer = Callable[[Array, ArrayLike], NDArray[np.float32]]

@@ -314,9 +314,7 @@ def energy(cycles: int = 2000, seed: int = 0) -> int:
     return 0
 
 
-def speed(
-    only: tuple[str, ...] = (), rounds: int = 7, json: Path | None = None, strict: bool = False
-) -> int:
+def speed(only: tuple[str, ...] = (), rounds: int = 7, json: Path | None = None) -> int:
     """Measure speed, interleaved with other environments, and compare with the targets.
 
     Args:
@@ -324,7 +322,6 @@ def speed(
             default.
         rounds: Number of interleaved rounds; the median counts.
         json: Also write the figures to this file.
-        strict: Exit code 1 if a minimum is missed.
     """
     from benchmarks.runs.store import write_record
     from benchmarks.speed import groups, rates
@@ -334,8 +331,7 @@ def speed(
     print(rates.table(results))
     if json:
         write_record(json, rates.record(results))
-    missed = [result for result in results if result.passed is False]
-    return 1 if strict and missed else 0
+    return 0
 
 
 @dataclass(frozen=True)
@@ -400,10 +396,8 @@ def show(
 def diagnosis(
     chosen: Literal["small", "tune", "final"] = "small",
     offset: int = 0,
-    fraction: float = 1.0,
     kind: tuple[str, ...] = (),
     name: tuple[str, ...] = (),
-    limit: int | None = None,
     loops: int = 0,
     next: bool = False,
     force: bool = False,
@@ -417,10 +411,8 @@ def diagnosis(
     Args:
         chosen: Set of cases.
         offset: Number of the random draw of cases.
-        fraction: Fraction of the cases of every kind and cause, for a quick run.
         kind: Only cases of these kinds.
         name: Only cases with one of these hidden effects.
-        limit: Maximum number of cases.
         loops: Number of cases per cause that are run in closed loop on the hidden rig.
         next: Run the proposed experiments.
         force: Compute stored cases again.
@@ -436,9 +428,7 @@ def diagnosis(
     from pam_envs.diagnosis.static.diagnosis import diagnose_readings
 
     folder = running.FOLDER if cells is None else cells
-    cases = (chosen, offset, fraction, kind, name, limit, loops, next)
-    where = (computing.jobs, force, folder, computing.backend, computing.address)
-    options = running.Options(*cases, *where)
+    options = running.Options(chosen, offset, kind, name, loops, next, force, folder, computing)
     with progress("cases") as start:
         report = running.run(options, start)
     print(f"{report.computed} computed, {report.found} were there already")

@@ -97,7 +97,6 @@ def render(
     load: float | None = None,
     seed: int = 0,
     fps: int = 25,
-    gif: bool = False,
 ) -> None:
     """Write a video of an environment controlled by the inverse of its plant.
 
@@ -106,7 +105,7 @@ def render(
     env : str
         Id, with or without PAM/ and -v0.
     video : Path
-        Output file.
+        Output file, .mp4 or .gif.
     seconds : float
         Length of the episode [s].
     hysteresis : str
@@ -119,11 +118,8 @@ def render(
         Seed of the episode.
     fps : int
         Frames per second.
-    gif : bool
-        Write a .gif instead of an .mp4 (as --video NAME.gif does).
     """
     name = env_id(env)
-    video = video.with_suffix(".gif") if gif else video
     if video.suffix not in (".mp4", ".gif"):
         raise ValueError(f"--video {video} must end in .mp4 or .gif")
     if not 1 <= fps <= 100:

@@ -4,8 +4,6 @@ A key is the first author's name with the year, for example ``yeh2010``; a docst
 ``yeh2010, Eq. 10``.
 """
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Iterable

@@ -5,8 +5,6 @@ A component is a frozen dataclass whose fields are made by :func:`assumed`, :fun
 provenance and source. :func:`check` refuses a value out of bounds.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections import namedtuple
@@ -194,7 +192,7 @@ class Signals(tuple[Signal, ...]):
 
     __slots__ = ()
 
-    def __new__(cls, signals: Iterable[Signal]) -> Signals:
+    def __new__(cls, signals: Iterable[Signal]) -> "Signals":
         """Check that indices run 0, 1, 2, ... and names are unique."""
         made = super().__new__(cls, signals)
         if [s.index for s in made] != list(range(len(made))):

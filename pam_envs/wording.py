@@ -1,7 +1,5 @@
 """Suggestions at the end of messages about unknown names, and the name of this package."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 from importlib import metadata

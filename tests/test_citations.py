@@ -1,7 +1,5 @@
 """Sources by key: every key in the code has an entry in references.bib."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

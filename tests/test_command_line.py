@@ -1,7 +1,5 @@
 """The command line from the user's side."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -62,7 +60,7 @@ def test_film_lasts_as_long_as_the_episode(tmp_path: Path) -> None:
     pytest.importorskip("pygame")
     imageio = pytest.importorskip("imageio.v2")
     film = tmp_path / "film.gif"
-    options = ["--video", str(film.with_suffix(".mp4")), "--gif", "--seconds", "1.0"]
+    options = ["--video", str(film), "--seconds", "1.0"]
     assert main(["render", "MusclePositioning", *options, "--fps", "30"]) == 0
     with imageio.get_reader(film) as reader:
         assert len(list(reader)) == 31  # 30 a second, although that is no whole number of periods

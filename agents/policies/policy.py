@@ -3,8 +3,6 @@
 Inference needs neither torch nor stable-baselines3, and loading a file cannot run code.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import math
@@ -55,7 +53,7 @@ class OnnxPolicy:
         path: str | Path,
         signals: Signals | None = None,
         action_signals: Signals | None = None,
-    ) -> OnnxPolicy:
+    ) -> "OnnxPolicy":
         """Return the policy in a file, for an environment with these signals.
 
         The signals (``env.unwrapped.signals``), if given, must equal those of the training; a

@@ -7,8 +7,6 @@ the finished trials, its number and the seed alone: a killed search resumes with
 proposals, and parallel searches propose different settings.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import io
@@ -139,7 +137,7 @@ def objective(job: Job, trial: optuna.Trial) -> float:
     )
 
 
-def _trained(config: Config, seed: int, reports: Reports) -> float:
+def _trained(config: Config, seed: int, reports: "Reports") -> float:
     """Train and return the value of the best evaluation."""
     env = make_env(config)
     model = make_model(config, seed, env)

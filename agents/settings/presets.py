@@ -5,8 +5,6 @@ only the differences from another preset, without that preset's search, and with
 settings if the algorithm differs.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import re
@@ -132,7 +130,7 @@ class Config:
         """Settings of the algorithm in use."""
         return getattr(self, self.algo)
 
-    def decisive(self) -> Config:
+    def decisive(self) -> "Config":
         """Return the settings that affect the exported policy, the others at their defaults."""
         usual: Any = Config.checkpoint_steps
         return dataclasses.replace(self, search=Search(), checkpoint_steps=usual)

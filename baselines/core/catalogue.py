@@ -15,8 +15,6 @@ Numbers that neither a rule nor a paper fixes are *knobs* (:mod:`baselines.core.
 ``_tuned`` are controllers with knobs from a search (:mod:`baselines.core.tuned`).
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import os

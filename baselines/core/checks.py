@@ -1,14 +1,13 @@
 """Check of the policy-predictor contract, also for third-party controllers."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Controller
+from baselines.core.controller import Controller
+from pam_envs.arrays import Array
 from pam_envs.parameters import Signals
 
 

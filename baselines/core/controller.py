@@ -6,8 +6,6 @@ unchanged in ``evaluate_policy``, on one observation of shape (n_obs,) or on a b
 single observation); it is passed in and returned, and never changed in place.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar, final
@@ -15,9 +13,9 @@ from typing import Any, NamedTuple, Protocol, TypeVar, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.parameters import Signal, Signals
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 Prediction = tuple[NDArray[np.float32], Any]
 S = TypeVar("S", bound=tuple[Any, ...])

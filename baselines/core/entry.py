@@ -6,8 +6,6 @@ one of them; a factor of 1 gives the published or rule-based value to the last b
 catalogue declares its knobs with their bounds (``Entry.knobs``); makers read them by ``Spec.knob``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType

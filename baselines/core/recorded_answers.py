@@ -1,7 +1,5 @@
 """Recorded actions of a controller for fixed observations, which identify it by behaviour."""
 
-from __future__ import annotations
-
 import base64
 import math
 from collections.abc import Mapping
@@ -28,7 +26,7 @@ class RecordedAnswers:
     answers: Array
 
     @classmethod
-    def of(cls, controller: Any, observations: Array) -> RecordedAnswers:
+    def of(cls, controller: Any, observations: Array) -> "RecordedAnswers":
         """Return a controller's actions for observations in order from an episode's start."""
         return cls(observations, answers(controller, observations))
 
@@ -51,7 +49,7 @@ class RecordedAnswers:
     @classmethod
     def from_dict(
         cls, record: Mapping[str, Any], n_signals: int, n_actions: int
-    ) -> RecordedAnswers:
+    ) -> "RecordedAnswers":
         """Return the record that :meth:`as_dict` wrote."""
         made = cls(_array(record["observations"], n_signals), _array(record["answers"], n_actions))
         if not 0 < len(made.observations) == len(made.answers):

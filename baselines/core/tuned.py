@@ -5,8 +5,6 @@ as the search over a learned controller's settings. Its result is for one enviro
 separate entry beside the controller as published.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

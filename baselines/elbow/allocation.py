@@ -10,8 +10,6 @@ restricted to the pressures reachable in the valves' next step, torque first, so
 correct during the transition.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

@@ -8,8 +8,6 @@ pressures, so that two linear equations give them exactly. For references out of
 has priority, and the stiffness is as near as possible (:mod:`pam_envs.mechanics`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -17,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import Array, Reader, encode_actions, reader
+from baselines.core.controller import Reader, encode_actions, reader
 from baselines.core.entry import ELBOW, Entry, Spec
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.mechanics.allocation import allocate
 from pam_envs.parameters import Signal

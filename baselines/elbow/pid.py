@@ -11,8 +11,6 @@ one cycle as lag, an assumption. The dead time is that of the regulator, half of
 command, and a control period of computing.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple

@@ -13,8 +13,6 @@ error is at least half of the effect of a whole cycle: near empty, air leaves sl
 Each loop also gives the limits of the pressures at the end of its next step.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -23,9 +21,10 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, RowController
+from baselines.core.controller import Prediction, RowController
 from baselines.core.entry import Bounds, Spec
 from baselines.elbow.nominal import ELBOW_ENTRY, ElbowSignalMap, ElbowView, make_elbow_signal_map
+from pam_envs.arrays import Array
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.pneumatics.flow import mass_flow

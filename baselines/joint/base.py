@@ -23,8 +23,6 @@ and joints. Signals are named ``angle``, ``set_point``, ``reference`` for one jo
 ``angle_k``, ``set_point_k``, ``joint_reference_k`` for a manipulator.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -35,7 +33,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
 from baselines.core.controller import (
-    Array,
     Reader,
     RowController,
     encode_actions,
@@ -45,6 +42,7 @@ from baselines.core.controller import (
 )
 from baselines.core.entry import JOINT, Bounds, Entry, Spec
 from baselines.joint.model import JointModel
+from pam_envs.arrays import Array
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator

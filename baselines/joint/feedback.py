@@ -18,8 +18,6 @@ margins of the true arm.
 With preview, a loop tracks the reference later by its own delay (:mod:`baselines.joint.base`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, NamedTuple
@@ -27,7 +25,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction
+from baselines.core.controller import Prediction
 from baselines.core.entry import AS_DESIGNED, Knobs, Spec
 from baselines.joint.base import JOINT_ENTRY, PREVIEW_KNOBS, JointController, make_parts
 from baselines.joint.model import (
@@ -43,6 +41,7 @@ from baselines.joint.model import (
 from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.linear.pid import DELAY_PERIODS, FILTER, PID_KNOBS, Simc, simc_rule
 from baselines.linear.systems import DiscreteSystem, StateSpace, discrete, from_polynomials
+from pam_envs.arrays import Array
 
 Kind = Literal["pi", "pi_slow", "pid", "pid_smooth"]
 

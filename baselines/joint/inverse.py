@@ -7,8 +7,6 @@ history of commands: ``E(u_next, u_turn) = f_next - f_turn``. The printed sum (3
 to the first reversal (:mod:`pam_envs.identification.joint_forc`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Any

@@ -36,8 +36,6 @@ Limits act on the command after the model loop: the loop itself is unlimited, an
 model, which receives the limited command, lags. Nothing winds up.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Callable
@@ -48,7 +46,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from baselines.core.controller import Array
 from baselines.linear.bumpless import Bumpless, BumplessGains
 from baselines.linear.systems import (
     DiscreteSystem,
@@ -58,6 +55,7 @@ from baselines.linear.systems import (
     double_lag,
     state_space,
 )
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.identification.joint_forc import measure_joint
@@ -132,7 +130,7 @@ class JointModel:
         packed = tuple(part.reshape(*shape, *part.shape[1:]) for part in after)
         return self.slope * found.reshape(shape), packed
 
-    def narrowed(self, width: float) -> JointModel:
+    def narrowed(self, width: float) -> "JointModel":
         """Return the model with the hysteresis' width scaled, its tips unchanged; 0: a line."""
         if self.hysteresis is None or width == 0.0:
             return replace(self, hysteresis=None, slope=self.gain)

@@ -19,8 +19,6 @@ angles that can be held, so that the model saturates as the joint does, and ``u_
 the disturbance loop receives the applied command (:mod:`baselines.joint.model`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -28,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction
+from baselines.core.controller import Prediction
 from baselines.core.entry import Bounds, Spec
 from baselines.joint.base import JOINT_ENTRY, PREVIEW_KNOBS, JointController, make_parts
 from baselines.joint.model import (
@@ -42,6 +40,7 @@ from baselines.joint.model import (
 from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.linear.systems import DiscreteSystem
 from baselines.robust.requirements import Kind, robust_controller
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 
 KNOBS: Bounds = {"damping": (0.5, 1.5), "disturbance": (0.5, 2.0)}

@@ -10,8 +10,6 @@ In stance, and with the brace alone, the reference tension is tracked; in swing 
 the wire's torque on the knee.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -20,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import (
-    Array,
     Prediction,
     Reader,
     RowController,
@@ -32,6 +29,7 @@ from baselines.core.controller import (
 from baselines.core.entry import GAIT, KNEE, Bounds, Entry, Spec
 from baselines.knee.nominal import KneeObserver, KneeView, make_knee_observer
 from baselines.knee.published import NOMINAL_PRESSURE
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.parameters import Signal
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis

@@ -13,15 +13,13 @@ All of the paper's tests are without a leg: its angle controller would face 25 t
 its design.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.core.controller import Array
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.identification.frequency import RationalFit, fit_rational
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis

@@ -25,8 +25,6 @@ oscillate. The designs are in kPa, as in the paper; the loops command Pa of devi
 feedforward.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple

@@ -7,8 +7,6 @@ stance and an angle in swing. The names and units of the signals determine which
 stiffness ``s`` becomes the reference tension ``s (L - L_min)`` at the sensed angle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import Array, Reader, reader
+from baselines.core.controller import Reader, reader
 from baselines.core.entry import Spec
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 

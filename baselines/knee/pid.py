@@ -11,8 +11,6 @@ changes no faster than the pressure can, so that the rate limit saturates the co
 plant.
 """
 
-from __future__ import annotations
-
 from numpy.typing import ArrayLike
 
 from baselines.core.entry import AS_DESIGNED, KNEE, Entry, Knobs, Spec

@@ -10,17 +10,15 @@ plant and its design (gain, one zero, bandwidth and control weight) reproduce th
 coefficients (:func:`refit_controller`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from baselines.core.controller import Array
 from baselines.linear.bumpless import BumplessGains
 from baselines.linear.ltr import LtrDesign, design_ltr
 from baselines.linear.systems import StateSpace, from_polynomials, from_roots, state_space
+from pam_envs.arrays import Array
 
 NOMINAL_PRESSURE = 2e5
 """Operating pressure [Pa] (yeh2010, section 4.1)."""

@@ -27,8 +27,6 @@ References
 zaccarian2002 for the structure; yeh2010, section 4.2.
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -38,8 +36,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cdf2rdf
 
-from baselines.core.controller import Array
 from baselines.linear.systems import DiscreteSystem, StateSpace, delayed, discrete, time_constant
+from pam_envs.arrays import Array
 
 SMALLEST = 1e-7
 """Distance from the inequality's bound that counts as feasible."""
@@ -109,7 +107,7 @@ class Bumpless:
         if not self.low < self.high:
             raise ValueError(f"low is {self.low} and high {self.high}; low must be below: swap")
 
-    def without(self) -> Bumpless:
+    def without(self) -> "Bumpless":
         """Return this controller with clamping instead of its compensator."""
         return replace(self, compensated=False)
 

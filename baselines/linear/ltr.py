@@ -12,8 +12,6 @@ Its zeros are the poles of the plant. Recovery needs a plant without zeros in th
 The bandwidth ``b`` is ``1/sqrt(mu)`` of the literature, in **rad/s**.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +20,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.core.controller import Array
 from baselines.linear.systems import (
     Complex,
     DiscreteSystem,
@@ -32,6 +29,7 @@ from baselines.linear.systems import (
     state_space,
     time_constant,
 )
+from pam_envs.arrays import Array
 from pam_envs.identification.frequency import RationalFit
 
 Response = Callable[[NDArray[np.float64]], Complex]
@@ -96,7 +94,7 @@ class LtrDesign:
 
 
 def design_ltr(
-    plant: StateSpace | RationalFit, bandwidth: float, control_weight: float
+    plant: "StateSpace | RationalFit", bandwidth: float, control_weight: float
 ) -> LtrDesign:
     """Return the controller of loop transfer recovery; see this module's page.
 

@@ -13,8 +13,6 @@ the hold, and one of computing on a real rig. The environments have no computing
 applies from the instant of its observation), so that in simulation the whole period is margin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -22,8 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, RowController, encode_action
+from baselines.core.controller import Prediction, RowController, encode_action
 from baselines.core.entry import AS_DESIGNED, Bounds, Knobs
+from pam_envs.arrays import Array
 from pam_envs.parameters import Signal
 
 DELAY_PERIODS = 1.5

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import matrix_balance
 
-from baselines.core.controller import Array
+from pam_envs.arrays import Array
 
 if TYPE_CHECKING:
     import control

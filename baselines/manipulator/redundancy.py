@@ -8,8 +8,6 @@ and is counted. :func:`~pam_envs.mechanics.redundancy.resolution.resolve` plans 
 raises an error for such a pose.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -17,15 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import (
-    Array,
-    Prediction,
-    Reader,
-    RowController,
-    encode_actions,
-    reader,
-)
+from baselines.core.controller import Prediction, Reader, RowController, encode_actions, reader
 from baselines.core.entry import ARM, Entry, Spec
+from pam_envs.arrays import Array
 from pam_envs.mechanics.redundancy.resolution import LIMIT, Resolution, UnreachablePose, resolve
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.parameters import Signal

@@ -18,8 +18,6 @@ out in turn, at every load, on both branches. Pressures are clipped to the regul
 The published equations and those refitted to Table 6 used all five repeats.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -29,8 +27,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from baselines.core.controller import Array
-from pam_envs.data.tables import BAR, MM, ContractionTable, load_contraction_table
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
+from pam_envs.data.tables import ContractionTable, load_contraction_table
 
 Curve = Callable[[Array], Any]
 

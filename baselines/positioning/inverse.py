@@ -22,8 +22,6 @@ limit and every early start. With an exact model the PID is at rest; it corrects
 wrong parameter or an undeclared load. (Two degrees of freedom with an internal model.)
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,7 +32,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import (
-    Array,
     Prediction,
     Reader,
     RowController,
@@ -47,6 +44,7 @@ from baselines.core.entry import Bounds, Entry, Spec
 from baselines.linear.pid import PID_KNOBS, Gains, PidState, pid_start, pid_step
 from baselines.positioning.nominal import LoadedMuscle, Nominal
 from baselines.positioning.pid import simc
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.parameters import Signal
 from pam_envs.plants.single_muscle.plant import SingleMuscle

@@ -5,8 +5,6 @@ Rows may have different loads: they are processed by load, and the model at a lo
 inverse, static curve) is prepared when that load first occurs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from baselines.core.controller import Array, by_load
+from baselines.core.controller import by_load
 from baselines.positioning.contraction_tables import LOADS
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.plants.single_muscle.plant import SingleMuscle

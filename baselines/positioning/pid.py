@@ -12,8 +12,6 @@ The regulator's slew limit causes windup like its range. The distance of the set
 regulator at its slew limit.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

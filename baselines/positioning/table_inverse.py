@@ -24,8 +24,6 @@ then jumps by up to the width of the major loop (1 bar), up to 3 mm of contracti
 require a state of all extrema (:mod:`baselines.positioning.inverse`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
@@ -35,7 +33,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import (
-    Array,
     Prediction,
     Reader,
     RowController,
@@ -53,6 +50,7 @@ from baselines.positioning.contraction_tables import (
     published_inverse,
     table_6_inverse,
 )
+from pam_envs.arrays import Array
 from pam_envs.data.tables import load_contraction_table
 from pam_envs.parameters import Signal
 

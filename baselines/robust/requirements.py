@@ -35,8 +35,6 @@ design; behind it all of them are stable too, with peaks of 1.60 (2.12).
 Sources: packard1993; skogestad2005, chapter 8.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -46,7 +44,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.core.controller import Array
 from baselines.linear.systems import (
     Complex,
     StateSpace,
@@ -55,6 +52,7 @@ from baselines.linear.systems import (
     response,
     state_space,
 )
+from pam_envs.arrays import Array
 
 FREQUENCIES = np.geomspace(1e-2, 1e3, 401)
 """Frequencies [rad/s] at which loops are evaluated."""

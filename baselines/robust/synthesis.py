@@ -25,8 +25,6 @@ The real gain is scaled as if it were complex (D instead of D, G scaling). For t
 ``mu`` with a real gain and the bound by SLICOT's AB13MD are reported.
 """
 
-from __future__ import annotations
-
 import json
 from importlib.metadata import version
 from pathlib import Path
@@ -36,10 +34,10 @@ import numpy as np
 from scipy.linalg import schur, solve_continuous_lyapunov, solve_sylvester
 from scipy.optimize import least_squares
 
-from baselines.core.controller import Array
 from baselines.linear.ltr import integrator
 from baselines.linear.systems import Complex, StateSpace, from_polynomials, response, state_space
 from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
+from pam_envs.arrays import Array
 
 Scales = tuple[StateSpace, StateSpace] | None
 FILE = Path(__file__).with_name("joint_robust.json")

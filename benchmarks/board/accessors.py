@@ -12,7 +12,8 @@ from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import statistics
 from benchmarks.scoring.group import Column
 from benchmarks.scoring.metrics import headline_of, headlines_of, shown
-from benchmarks.scoring.statistics import Array, Interval
+from benchmarks.scoring.statistics import Interval
+from pam_envs.arrays import Array
 
 LISTED_SEEDS = 5  # training seeds that a learned row needs to be ranked
 VERIFIED = "verified"

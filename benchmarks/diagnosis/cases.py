@@ -14,15 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.recording import Recording
-from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.decide.isolability import base_subspace, projected
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import calibrate
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, inputs_of, start_plant
 from tests.diagnosis import hidden
 
-Array = NDArray[np.float64]
 Effects = list[tuple[hidden.Effect, float]]
 
 NOISE = np.array([hidden.CONTRACTION_NOISE_MM * MM, hidden.PRESSURE_NOISE_BAR * BAR])

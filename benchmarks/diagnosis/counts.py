@@ -4,8 +4,6 @@ Pure functions of the records. Shares have exact (Clopper-Pearson) 95 % confiden
 ``upper`` is the one-sided 95 % bound. A failed run counts as wrong.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -47,7 +45,7 @@ class Answer:
     record: Mapping[str, Any]
 
     @classmethod
-    def of(cls, record: Mapping[str, Any]) -> Answer:
+    def of(cls, record: Mapping[str, Any]) -> "Answer":
         """Read a record."""
         case, failed = record["case"], bool(record["failure"])
         return cls(
@@ -170,31 +168,19 @@ SHARES: dict[str, tuple[str, Callable[[Answer], bool]]] = {
 """Shares of the page: kinds of cases, and the counted property."""
 
 
-def exact_interval(count: int, n: int, level: float = LEVEL) -> list[float]:
-    """Return the two-sided Clopper-Pearson interval of a share."""
-    tail = 0.5 * (1.0 - level)
-    low = float(stats.beta.ppf(tail, count, n - count + 1)) if count > 0 else 0.0
-    high = float(stats.beta.ppf(1.0 - tail, count + 1, n - count)) if count < n else 1.0
-    return [low, high]
-
-
-def upper_bound(count: int, n: int, level: float = LEVEL) -> float:
-    """Return the one-sided upper Clopper-Pearson bound of a share."""
-    return float(stats.beta.ppf(level, count + 1, n - count)) if count < n else 1.0
-
-
 def share(marks: Iterable[bool]) -> Numbers:
     """Return count and share of true marks with bounds; None without marks."""
     listed = [bool(mark) for mark in marks]
     count, n = sum(listed), len(listed)
     if n == 0:
         return {"count": 0, "n": 0, "value": None, "interval": None, "upper": None}
+    both, less = (stats.binomtest(count, n, alternative=a) for a in ("two-sided", "less"))
     return {
         "count": count,
         "n": n,
         "value": count / n,
-        "interval": exact_interval(count, n),
-        "upper": upper_bound(count, n),
+        "interval": list(both.proportion_ci(LEVEL, "exact")),
+        "upper": less.proportion_ci(LEVEL, "exact").high,
     }
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.diagnosis.gait_recording import GaitRecording, record
 from benchmarks.diagnosis.plain_plant import Parameters, PlainPlant, plain_causes
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.structure import Regressors
@@ -24,8 +25,6 @@ from pam_envs.diagnosis.fit.blocks import EVERY, Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
 from pam_envs.diagnosis.fit.least_squares import Problem
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE
-
-Array = NDArray[np.float64]
 
 PARAMETERS: Parameters = {
     "shank.length": (0.43, 0.3, 0.6, 0.01),

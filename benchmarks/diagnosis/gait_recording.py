@@ -5,18 +5,15 @@ inverse dynamics, the knee torque. The orthosis measures shoe forces and the lea
 computes Eq. (1) from them. Pace and centre of pressure vary from stride to stride.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.mechanics.leg import Leg
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.knee_orthosis.rollout import simulate_knee
-
-Array = NDArray[np.float64]
 
 PERIOD = KneeOrthosis.control_period
 PACE_SPREAD = 0.06  # largest relative deviation of a stride's duration from the mean
@@ -47,7 +44,7 @@ class GaitRecording:
         """Time [s] of the concatenated strides."""
         return np.asarray(np.arange(len(self.torque)) * PERIOD, np.float64)
 
-    def and_then(self, other: GaitRecording) -> GaitRecording:
+    def and_then(self, other: "GaitRecording") -> "GaitRecording":
         """Return this recording followed by another one of the same leg."""
         if self.leg != other.leg:
             raise ValueError("both recordings must be of one leg; record them with one plant")

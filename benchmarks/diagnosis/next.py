@@ -8,8 +8,10 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.diagnosis.cases import NOISE, Case, Made, recording_of, sheet_of
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.recording import Recording
-from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.closed_loop.gain import DURATION
 from pam_envs.diagnosis.experiment.plans import Means, Plan, plans
 from pam_envs.plants.core.stepper import PERIOD
@@ -18,8 +20,6 @@ from tests.diagnosis.hidden.catalogue import constants
 from tests.diagnosis.hidden.kernel import begin, one_period
 from tests.diagnosis.hidden.records import STATE, blank
 from tests.diagnosis.hidden.rig import steps_in
-
-Array = NDArray[np.float64]
 
 FULL = 6.0  # largest pressure [bar] of the rigs
 FRESH = ("cycles_after_rest",)  # plans with a rested muscle, for which the rig is reset
@@ -31,7 +31,9 @@ def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:
     plan = {p.name: p for p in plans(means)}[plan_name]
     before = made.ground.campaign
     extra = _campaign(plan, before)
-    whole = _joined(before, extra)
+    names = ("command_bar", "segment", "load_N", "temperature_C", "valve_closed")
+    both: Any = {n: np.concatenate([getattr(before, n), getattr(extra, n)]) for n in names}
+    whole = replace(before, **both)
     sheet = sheet_of(made.ground.base, whole, case.noise)
     if plan.name in FRESH:  # time restarts in the second recording
         runs = [(made.effects, before), (made.effects, extra)]
@@ -61,12 +63,6 @@ def _campaign(plan: Plan, before: hidden.Campaign) -> hidden.Campaign:
         shut,
         before.period,
     )
-
-
-def _joined(first: hidden.Campaign, second: hidden.Campaign) -> hidden.Campaign:
-    names = ("command_bar", "segment", "load_N", "temperature_C", "valve_closed")
-    both: Any = {n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in names}
-    return replace(first, **both)
 
 
 def _sooner(effect: hidden.Effect, share: float) -> hidden.Effect:

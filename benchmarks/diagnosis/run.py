@@ -4,7 +4,6 @@ A record belongs to a case, a stage and the numbers of rule, causes and default 
 computed again for another version of the rule. A failed case also has a record and counts as wrong.
 """
 
-import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, astuple, dataclass, field
@@ -18,6 +17,7 @@ from benchmarks.diagnosis.cases import Case, cases
 from benchmarks.diagnosis.study import loops, promised, study
 from benchmarks.identity.hashing import digest
 from benchmarks.runs import provenance
+from benchmarks.runs.runner import Computing
 from benchmarks.runs.store import Store, read_record
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.causes import catalogue
@@ -28,6 +28,7 @@ from sweeps import engine
 HERE = Path(__file__).parents[1]
 FOLDER = HERE / ".cells" / "diagnosis"
 SHUFFLE = 20_260_101
+ONE_JOB = Computing(jobs=1)
 
 Study = Callable[[Case, Collection[str]], dict[str, Any]]
 Advance = Callable[[], None]
@@ -62,36 +63,25 @@ class Options:
 
     chosen: str = "small"
     offset: int = 0
-    fraction: float = 1.0  # of the cases of every kind and cause
     kinds: tuple[str, ...] = ()
     names: tuple[str, ...] = ()  # of hidden effects
-    limit: int | None = None
     loops: int = 0  # number of cases of every cause that are run in closed loop
     next: bool = False  # carry out the proposed experiments
-    jobs: int = 1
     force: bool = False
     folder: Path = FOLDER
-    backend: str = "loky"
-    address: str = ""
-
-    @property
-    def cluster(self) -> engine.Cluster:
-        """Backend of the computation."""
-        return engine.Cluster(self.jobs, self.backend, self.address)
+    computing: Computing = ONE_JOB
 
     @property
     def whole(self) -> bool:
         """True if every case of the set is run."""
-        part = self.fraction < 1.0 or self.limit is not None
-        return not (part or self.kinds or self.names)
+        return not (self.kinds or self.names)
 
     @property
     def arguments(self) -> str:
         """Arguments of the command that gives the same records."""
         given: dict[str, Any] = {"chosen": self.chosen, "offset": self.offset or None}
-        given["fraction"] = f"{self.fraction:g}" if self.fraction < 1.0 else None
         given |= {"kind": " ".join(self.kinds), "name": " ".join(self.names)}
-        given |= {"limit": self.limit, "loops": self.loops or None}
+        given["loops"] = self.loops or None
         words = [f"--{name} {value}" for name, value in given.items() if value not in (None, "")]
         return " ".join(words + ["--next"] * self.next)
 
@@ -111,9 +101,7 @@ class Report:
 
 
 def select(options: Options) -> list[Case]:
-    """Return the cases to run, kinds and causes mixed; a larger fraction contains a smaller."""
-    if not 0.0 < options.fraction <= 1.0:
-        raise ValueError(f"fraction {options.fraction} is outside (0, 1]; give a part, like 0.1")
+    """Return the cases to run, kinds and causes mixed."""
     drawn = cases(options.chosen, options.offset)
     _known("kind", options.kinds, {case.kind for case in drawn})
     _known("effect", options.names, {name for case in drawn for name in case.names})
@@ -123,29 +111,14 @@ def select(options: Options) -> list[Case]:
         if (not options.kinds or case.kind in options.kinds)
         and (not options.names or set(options.names) & set(case.names))
     ]
-    rng = np.random.default_rng(SHUFFLE)
-    totals, seen = Counter(map(_group, matching)), Counter[tuple[str, ...]]()
-    kept = []
-    for case in matching:
-        group = _group(case)
-        number = math.ceil(options.fraction * totals[group] - 1e-9)
-        if (
-            seen[group] < number
-        ):  # each group is spread evenly over the run, at random within each interval
-            kept.append(((seen[group] + rng.random()) / number, case))
-        seen[group] += 1
-    return [case for _, case in sorted(kept, key=lambda entry: entry[0])][: options.limit]
+    order = np.random.default_rng(SHUFFLE).permutation(len(matching))
+    return [matching[k] for k in order]
 
 
 def _known(what: str, given: Iterable[str], known: Collection[str]) -> None:
     for name in given:
         if name not in known:
             raise ValueError(f"no {what} is called {name!r}; there are {', '.join(sorted(known))}")
-
-
-def _group(case: Case) -> tuple[str, ...]:
-    """Return the stratum of a case: its kind, and its cause if it has one."""
-    return (case.kind, *(case.names if case.kind in ("single", "weak", "loud") else ()))
 
 
 def run(
@@ -206,7 +179,7 @@ def _stage(
     report.found += len(tasks) - len(missing)
     if missing:
         advance = start(len(missing))
-        for _ in _computed(missing, store, options.cluster, act):
+        for _ in _computed(missing, store, options.computing.cluster, act):
             report.computed += 1
             advance()
     return {case: read_record(store.path(task.key)) for case, task in tasks.items()}

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from benchmarks.diagnosis.plain_plant import Parameters, PlainPlant, plain_causes
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.decide.structure import FILTERS, Regressors, low_pass
 from pam_envs.diagnosis.fit.starting_values import grid
-
-Array = NDArray[np.float64]
 
 SUBSTEPS = 4  # simulation steps between two readings
 NEWTON = 12

@@ -4,8 +4,6 @@ Between two events the motion under a constant force is linear and computed in c
 is a set-valued Coulomb law with a higher breakaway force. No code is shared with the fitted model.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -39,7 +37,7 @@ class Oscillator:
     drift: float = 0.0  # of the sensor over an experiment [m]
 
     @classmethod
-    def drawn(cls, seed: int, **hidden: float) -> Oscillator:
+    def drawn(cls, seed: int, **hidden: float) -> "Oscillator":
         """Return a rig with drawn constants and given hidden effects."""
         rng = np.random.default_rng([seed, 1])
         factors = np.exp(rng.uniform(-1.0, 1.0, 3) * np.log(SPREAD))

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
 from benchmarks.head_to_head import sysid as theirs
 from benchmarks.head_to_head.mass_spring_damper import CAUSES, MassSpringDamper
@@ -21,13 +20,12 @@ from benchmarks.head_to_head.page import page
 from benchmarks.head_to_head.rig import NOISE, PERIOD, Oscillator, another, campaign
 from benchmarks.identity.hashing import plain
 from benchmarks.runs.provenance import packages
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.verdict import Decision, decide
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
 from pam_envs.diagnosis.fit.least_squares import Problem, column_of
-
-Array = NDArray[np.float64]
 
 HERE = Path(__file__).parents[1]
 RESULTS = HERE / "results" / "head_to_head.json"

@@ -12,11 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.head_to_head.mass_spring_damper import PARAMETERS
-
-Array = NDArray[np.float64]
+from pam_envs.arrays import Array
 
 STEP = 0.005  # step of MuJoCo's simulation [s]
 MECHANISM = Path(__file__).with_name("mechanism.xml")

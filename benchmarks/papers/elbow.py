@@ -7,8 +7,6 @@ may differ by 0.02 N m. ``k1`` is read as -0.21 + 4.41 mus per kPa; the printed 
 for comparison only. Hysteresis and sign change are inputs and therefore not judged.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 from typing import Any
@@ -135,10 +133,8 @@ def exactness() -> Iterator[Figure]:
     where, words = f"{SOURCE}, {'; '.join(f'Eq. ({n})' for n in FORCES)}", "Q = (P_b - P_a) r"
     title = "round trip of the pressures"
     yield Figure(title, trip, "of full", where, note=tag, at_most=1e-9, claim=words)
-    where, words = (
-        f"{SOURCE}, section 3: order of the pressures",
-        "is set to achieve the desired stiffness",
-    )
+    where = f"{SOURCE}, section 3: order of the pressures"
+    words = "is set to achieve the desired stiffness"
     either: dict[str, Any] = {"at_most": 0.01, "why": ORDER, "note": tag}
     title = "share of bundle b in the change of stiffness, 60 degrees"
     change = [float(abs(np.diff(plant.stiffness(q[60], *p))[0])) for p in ENDS]

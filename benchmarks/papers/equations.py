@@ -1,12 +1,9 @@
 """Equations, tables and statements of the papers that are checked by themselves, without a run."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.positioning import contraction_tables as curves
 from benchmarks.papers.elbow import SOURCE as ELBOW
@@ -14,12 +11,12 @@ from benchmarks.papers.elbow import bundle
 from benchmarks.papers.joint import SOURCE as JOINT
 from benchmarks.papers.knee import SOURCE as KNEE
 from benchmarks.papers.published import BEFORE, Figure, Group, as_published
-from pam_envs.data.tables import BAR, MM, load_contraction_table
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
+from pam_envs.data.tables import load_contraction_table
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-Array = NDArray[np.float64]
 
 # --- knee orthosis ------------------------------------------------------------------------------
 
@@ -41,10 +38,8 @@ def brace() -> Iterator[Figure]:
     why = "cos2 is a misprint: Eq. (3) and virtual work have cos"
     yield Figure(name, 1.0 / cosine, "", where, expected=1.0, tolerance=1e-6, claim=words, why=why)
     printed = lever.stiffness * (NOMINAL - lever.relaxed_angle) / (lever.arm * cosine)
-    name, where = (
-        "tension without assistance as printed",
-        f"{KNEE}, section 3: tension for a torque",
-    )
+    name = "tension without assistance as printed"
+    where = f"{KNEE}, section 3: tension for a torque"
     why = "a sign: the wire is bent below its relaxed angle, kappa (theta_0 - theta) is meant"
     yield Figure(name, printed, "N", where, at_least=0.0, claim="shortening tension", why=why)
     name, where = "tension without assistance at 22 cm", f"{KNEE}, section 4.1: operating point"
@@ -111,10 +106,8 @@ def bundles() -> Iterator[Figure]:
     for share, place in ((24, "24 %"), (32, "28 and 32 %")):
         at = 0.01 * share * bundle(1).nominal_length
         ours = float(bundle(1).law(5e5, at) - bundle(1).law(0.0, at))
-        name, where = (
-            f"gain of force by filling at {share} %",
-            f"{ELBOW}, section 2: filling at {place}",
-        )
+        name = f"gain of force by filling at {share} %"
+        where = f"{ELBOW}, section 2: filling at {place}"
         words = "does not exceed its original size" if share == 24 else "a decrease"
         yield Figure(name, ours, "N", where, at_most=0.0, claim=words, why=ONE_END)
 
@@ -209,20 +202,16 @@ def table_statistics() -> Iterator[Figure]:
         where = f"{MUSCLE}, {place}"
         yield Figure(name, off, "mm", where, at_most=0.0061, claim=words)
         off = float(np.abs(readings.std(axis=1) - numbers(PRINTED_DEVIATIONS[load])).max())
-        name, words = (
-            f"{load:g} kg: largest difference of a printed deviation",
-            "Standard Deviation",
-        )
+        name = f"{load:g} kg: largest difference of a printed deviation"
+        words = "Standard Deviation"
         where += "; section 3.1.1: standard deviations" if load == 0.0 else ""
         note = "of a population: divided by 5, not by 4"
         yield Figure(name, off, "mm", where, at_most=1.1e-5, claim=words, note=note)
         inflated = table.branch(load, True)[1].mean(axis=1) / MM
         steps, tops = [*steps, *np.diff(inflated)], [*tops, float(inflated[-1])]
     least = float(min(steps))
-    name, where = (
-        "least change of contraction by 0.5 bar more",
-        f"{MUSCLE}, section 2.2: rule 2; Fig. 3",
-    )
+    name = "least change of contraction by 0.5 bar more"
+    where = f"{MUSCLE}, section 2.2: rule 2; Fig. 3"
     yield Figure(name, least, "mm", where, at_least=0.0, claim="will decrease")
     name, where = "the same, by the text of the method", "section 2.3: contraction and pressure"
     why = "the text has the sign of the length; the tables and Fig. 4 have that of the contraction"
@@ -234,10 +223,8 @@ def table_statistics() -> Iterator[Figure]:
     yield Figure(
         name, float(shape[0] * shape[1]), "1", where, expected=125.0, tolerance=0.0, note=note
     )
-    name, where = (
-        "contraction at 6 bar without load less the largest with one",
-        "section 4: largest",
-    )
+    name = "contraction at 6 bar without load less the largest with one"
+    where = "section 4: largest"
     words, where = "when the muscle is not loaded", f"{MUSCLE}, {where} contraction"
     yield Figure(name, tops[0] - max(tops[1:]), "mm", where, at_least=0.0, claim=words)
     name, where = "25 % of the length", f"{MUSCLE}, section 2.2: 25 %; Table 1"
@@ -246,10 +233,8 @@ def table_statistics() -> Iterator[Figure]:
     muscle = as_published(SingleMuscle.mas10("maxwell_slip")).muscle
     strain = np.linspace(0.0, 0.3, 301)
     force = np.asarray(muscle.tension(4e5, strain))
-    name, where = (
-        "largest change of force at 4 bar by 0.1 % more contraction",
-        f"{MUSCLE}, Fig. 3; section 2.2: rule 3",
-    )
+    name = "largest change of force at 4 bar by 0.1 % more contraction"
+    where = f"{MUSCLE}, Fig. 3; section 2.2: rule 3"
     words = "will shorten if its load is reduced"
     yield Figure(name, float(np.diff(force).max()), "N", where, at_most=0.0, claim=words)
     limit = float(np.interp(0.0, -np.asarray(muscle.tension(6e5, strain)), strain))

@@ -1,7 +1,5 @@
 """Figures of all papers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from benchmarks.papers import (

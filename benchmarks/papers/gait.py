@@ -10,14 +10,11 @@ agreement with these figures is therefore no evidence. Their values with the pap
 stance only, are reported beside them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.knee.published import printed_bumpless, printed_controller
 from baselines.linear.bumpless import make_bumpless
@@ -25,6 +22,7 @@ from baselines.linear.systems import discrete
 from benchmarks.papers.knee import PERIOD, SOURCE
 from benchmarks.papers.published import Figure, Group, as_published, note
 from benchmarks.scoring.group import rms
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.identification.emg_calibration import PUBLISHED, change, stride_torques
 from pam_envs.muscle.emg import MuscleActivation, Reading, calibration, emg_proxy
@@ -32,7 +30,6 @@ from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
 from pam_envs.plants.knee_orthosis.rollout import simulate_knee
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE
 
-Array = NDArray[np.float64]
 NAMES: dict[Activity, str] = {
     "walk": "walking",
     "stairs_up": "stairs up",
@@ -143,10 +140,8 @@ def emg_reductions() -> Iterator[Figure]:
     for stride in (PAPER_STRIDE, NATURAL_STRIDE):
         yield from _estimator_errors(stride)
     ratio = estimator_error(NATURAL_STRIDE) / estimator_error(PAPER_STRIDE)
-    name, words = (
-        "error of Eq. (1) at natural pace over that at 5 s",
-        "no longer provides a good estimate",
-    )
+    name = "error of Eq. (1) at natural pace over that at 5 s"
+    words = "no longer provides a good estimate"
     text = note("predicted", "preset full balance of the leg", "RMS in stance")
     yield Figure(name, ratio, "", FASTER, note=text, at_least=1.0, claim=words)
 
@@ -259,10 +254,8 @@ def switching_transient() -> Iterator[Figure]:
         text = note("predicted", preset, "at the switch", other)
         yield figure(f"pressure jump {name}", jump, "kPa", note=text)
         errors.append(error)
-    name, text = (
-        "tension error with over without",
-        note("predicted", preset, "largest after the switch"),
-    )
+    name = "tension error with over without"
+    text = note("predicted", preset, "largest after the switch")
     words = "can die out quickly"
     yield figure(name, errors[0] / errors[1], note=text, at_most=1.0, claim=words)
 

@@ -4,8 +4,6 @@
 groups compute; the others state why there is none, under ``not modelled`` or ``not checkable``.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import cache

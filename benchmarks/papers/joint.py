@@ -6,8 +6,6 @@ value within 5 %; a miss states its reason. Every feedback loop on the joint's a
 model-following, the disturbance loop) is evaluated with the same nominal plant in continuous time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -18,7 +16,7 @@ from numpy.typing import NDArray
 
 from baselines.joint.model import POLE, pi_system, pole_cancelling
 from baselines.linear import ltr
-from baselines.linear.systems import discrete, double_lag, response
+from baselines.linear.systems import StateSpace, discrete, double_lag, response
 from baselines.robust.requirements import FREQUENCIES, RobustDesign, robust_controller, sensitivity
 from benchmarks.papers.joint_hysteresis import (
     antisymmetry_error,
@@ -42,10 +40,10 @@ from benchmarks.papers.joint_studies import (
     tracking_error,
 )
 from benchmarks.papers.published import BEFORE, Figure, Group, as_published
+from pam_envs.arrays import Array
 from pam_envs.identification.joint_forc import CONGRUENCY, SYMMETRY
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 SOURCE = "fluidic_muscles"
@@ -108,15 +106,19 @@ def near(
     return Figure(name, ours, unit, tolerance=band, expected=expected, **words)
 
 
-def nominal_step() -> tuple[Array, Array]:
-    """Return times [s] and the step response of the nominal plant with the PI."""
-    loop = double_lag(POLE) * pi_system(pole_cancelling())
-    fine = discrete(loop.feedback(), 1e-4, "zoh")
+def unit_step(system: StateSpace, seconds: float) -> tuple[Array, Array]:
+    """Return times [s] and the step response of a continuous system."""
+    fine = discrete(system, 1e-4, "zoh")
     state, outputs = fine.initial_state(), []
-    for _ in range(20000):
+    for _ in range(round(seconds / 1e-4)):
         state = fine.advance(1.0, state)
         outputs.append(float(fine.output(1.0, state)))
     return 1e-4 * np.arange(1.0, len(outputs) + 1.0), np.array(outputs)
+
+
+def nominal_step() -> tuple[Array, Array]:
+    """Return times [s] and the step response of the nominal plant with the PI."""
+    return unit_step((double_lag(POLE) * pi_system(pole_cancelling())).feedback(), 2.0)
 
 
 def pi_figures() -> Iterator[Figure]:
@@ -138,12 +140,7 @@ def pi_figures() -> Iterator[Figure]:
     yield near("PI: rise on the coarse samples", rise, "s", 0.1274, EXACT, note=text)
     yield near("PI: settling to 2 %", exact.settling, "s", 0.370, EXACT)
     yield near("PI: phase margin", float(margin), "deg", 65.5, EXACT)
-    plant = discrete(double_lag(POLE), 1e-4, "zoh")
-    state, outputs = plant.initial_state(), []
-    for _ in range(10000):
-        state = plant.advance(1.0, state)
-        outputs.append(float(plant.output(1.0, state)))
-    alone = step_figures(1e-4 * np.arange(1.0, 10001.0), np.array(outputs)).rise
+    alone = step_figures(*unit_step(double_lag(POLE), 1.0)).rise
     where = f"{SOURCE}, Fig. 12; section 4: poles"
     yield near("rise of the double pole", alone, "s", 0.1456, EXACT, source=where)
     why = "a sign: poles at +23 rad/s would be unstable, -23 rad/s is meant"
@@ -257,10 +254,8 @@ def hysteresis_lines() -> Iterator[Figure]:
         for size in (10.0, 15.0, 20.0):
             name = f"{plant} joint, {size:g} deg: loop width without over with inverse"
             ratio = width_ratio(joint, np.radians(size))
-            where, words = (
-                f"{SOURCE}, section 3.2: width of the loop; Fig. 10",
-                "significant reduction",
-            )
+            where = f"{SOURCE}, section 3.2: width of the loop; Fig. 10"
+            words = "significant reduction"
             yield Figure(name, ratio, "", where, at_least=5.0, claim=words)
     where = f"{SOURCE}, Eq. (3.5)"
     exact, series = inverse_error()
@@ -270,10 +265,8 @@ def hysteresis_lines() -> Iterator[Figure]:
         "inverse by recursion", exact, "1", recursion, at_most=1e-12, note=text, claim=words
     )
     text = f"{text}; an independent program finds 1 % for another hysteresis"
-    words, why = (
-        "the unknown input",
-        "exact after one reversal; after more only if weights are even",
-    )
+    words = "the unknown input"
+    why = "exact after one reversal; after more only if weights are even"
     more = {"note": text, "at_most": 1e-12, "claim": words, "why": why}
     yield Figure("inverse (3.5) as printed", series, "1", where, **more)
     model, relays = inhomogeneous(), relay_output(inhomogeneous(), LEVELS)
@@ -285,15 +278,11 @@ def hysteresis_lines() -> Iterator[Figure]:
     yield Figure(name, off / scale, "1", where, note=text, at_most=1e-12, claim=words)
     where, words = f"{SOURCE}, section 3.1: antisymmetry", "f_ab = -f_ba"
     found_error = antisymmetry_error()
-    name, why = (
-        "error of f_ab = -f_ba over the range",
-        "right is E(b, a) = -E(a, b) of the map (3.2)",
-    )
+    name = "error of f_ab = -f_ba over the range"
+    why = "right is E(b, a) = -E(a, b) of the map (3.2)"
     yield Figure(name, found_error, "1", where, at_most=1e-12, claim=words, why=why)
-    name, where = (
-        "asymmetry of the joint's relay weights",
-        f"{SOURCE}, section 3.2: symmetric weights",
-    )
+    name = "asymmetry of the joint's relay weights"
+    where = f"{SOURCE}, section 3.2: symmetric weights"
     uneven = verdicts()["paper joint"].symmetry
     yield Figure(name, uneven, "1", where, at_most=SYMMETRY, claim="mu(a, b) = mu(-b, -a)")
     name, where = "3 % of the length over 25 % of stroke", f"{SOURCE}, section 1.1: 3 % and 10 %"
@@ -307,10 +296,8 @@ def disturbance_lines() -> Iterator[Figure]:
         title = f"2 deg off rejected to 10 %, {name}"
         yield near(title, rejection(name), "s", expected, why=why, source=where)
     ratio, words = rejection("joint_pi") / rejection(BEST), "significant reduction"
-    title, why = (
-        "time of the PI over that of the mu loop",
-        "robustness to +-35 % of gain costs speed",
-    )
+    title = "time of the PI over that of the mu loop"
+    why = "robustness to +-35 % of gain costs speed"
     yield Figure(title, ratio, "", where, at_least=1.0, claim=words, why=why)
 
 

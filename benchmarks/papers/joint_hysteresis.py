@@ -1,17 +1,15 @@
 """Hysteresis of a joint and its inverse: loop widths, symmetry, congruency (fluidic_muscles, 3)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.joint.model import JointModel, joint_model
 from benchmarks.papers.joint_studies import DEGREE, RANGE
 from benchmarks.papers.published import as_published
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.joint_forc import (
     JointHysteresis,
@@ -21,8 +19,6 @@ from pam_envs.identification.joint_forc import (
 )
 from pam_envs.identification.joint_muscle import HangingMuscle
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
-
-Array = NDArray[np.float64]
 
 
 def loop_path(

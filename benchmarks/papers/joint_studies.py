@@ -12,8 +12,6 @@ step and on a preceding turn; all combinations are evaluated, also on the plants
 hysteresis identified on the muscles; *paper* is the joint of two muscles that carries its link.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -22,7 +20,6 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 import pam_envs  # noqa: F401  registers the ids
@@ -33,12 +30,11 @@ from baselines.linear.systems import discrete, double_lag
 from benchmarks.papers.published import as_published
 from benchmarks.runs import rollout
 from benchmarks.scoring.group import rms
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
-
-Array = NDArray[np.float64]
 
 PERIOD, FINE = 0.01, 1e-3
 """Control period of the environments, and time between samples of the angle [s]."""

@@ -4,8 +4,6 @@
 here the plant is complete.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from typing import Any
@@ -116,10 +114,8 @@ def switch_environment() -> Iterator[Figure]:
         name = f"KneeWalk, {MISMATCH:g} N less none, {how}: tension error"
         yield figure(name, with_it - none, "N", note=note("predicted", slow, LARGEST, NO_NOISE))
     rough, smooth = (switching(MISMATCH, bumpless).tension for bumpless in (False, True))
-    name, text = (
-        "tension error without over with bumpless",
-        note("predicted", slow, LARGEST, NO_NOISE),
-    )
+    name = "tension error without over with bumpless"
+    text = note("predicted", slow, LARGEST, NO_NOISE)
     yield figure(name, rough / smooth, note=text, at_least=1.0, claim="quite oscillating behavior")
     figure = partial(Figure, source=FASTER_WALKING)
     for pace in (3.0, 2.0, NATURAL_STRIDE):  # the saturated swing leaves most of the transient
@@ -152,10 +148,8 @@ def emg_environment() -> Iterator[Figure]:
             yield Figure(title, ours, "%", PLACES[activity], **more)
         if activity == "walk":
             where, words = f"{SOURCE}, {QUADRICEPS}", "reduced"
-            ratio, text = (
-                found["emg_extensors_ratio"],
-                note("predicted", preset, RMS_NORM, NO_NOISE),
-            )
+            ratio = found["emg_extensors_ratio"]
+            text = note("predicted", preset, RMS_NORM, NO_NOISE)
             title = "EMG proxy of the extensors, with over without"
             yield Figure(title, ratio, "", where, note=text, at_most=1.0, claim=words)
     yield from peak_pressures()

@@ -4,8 +4,6 @@ An error is a root mean square over the half-range of the reference, without the
 paper's transient. Sensors are ideal, and the controllers know the plant.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache

@@ -6,24 +6,20 @@ other two paths were chosen to have the expected peaks, which are therefore inpu
 Freely drawn paths show the effect of the weight without any fit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.manipulator.redundancy import Comparison, compare
 from benchmarks.papers.published import BEFORE, Figure, Group
+from pam_envs.arrays import Array
 from pam_envs.envs.manipulator.paths import LEAP
 from pam_envs.mechanics.redundancy.resolution import LIMIT
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.references.path import PATHS, POINTS, PathEnds, draw_ends, joint_line
-
-Array = NDArray[np.float64]
 
 SOURCE = "fluidic_muscles"
 PLAN = f"{SOURCE}, Fig. 7; section 2: "
@@ -196,10 +192,8 @@ def _conditions() -> Iterator[Figure]:
     constraint = numeric_jacobian(q)
     free = np.linalg.svd(constraint)[2][5:]
     left = float(np.abs(free @ slope).max() / np.abs(slope).max())
-    name, where = (
-        "path_3: slope of the cost along the free direction",
-        f"{SOURCE}, Eq. (2.2); Eq. (2.7)",
-    )
+    name = "path_3: slope of the cost along the free direction"
+    where = f"{SOURCE}, Eq. (2.2); Eq. (2.7)"
     yield Figure(name, left, "of largest", where, at_most=1e-6, claim="local extremum")
     name, where = "redundant degrees of freedom", f"{SOURCE}, section 2: one redundant DOF"
     yield Figure(name, float(6 - np.linalg.matrix_rank(constraint)), "1", where, 1.0, 0.0)

@@ -3,22 +3,19 @@
 yeh2010, Fig. 12 and 13; fluidic_muscles, Fig. 10 and 16.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from baselines.joint.model import joint_model
 from benchmarks.papers.joint_hysteresis import loop_path
 from benchmarks.papers.joint_studies import DEGREE, FINE, HOLD, STEP, step, step_run
 from benchmarks.papers.published import as_published
+from pam_envs.arrays import Array
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
-Array = NDArray[np.float64]
 Signals = Mapping[str, Array]
 
 STANCE = "#e8edf3"

@@ -1,19 +1,15 @@
 """Figures of positioning2021: loop widths, simulated loops and positioning errors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.positioning.contraction_tables import positioning_error_table
 from benchmarks.papers.published import BEFORE, Figure, Group, as_published
 from benchmarks.scenarios.scenario_env import make_env
+from pam_envs.arrays import Array
 from pam_envs.data.tables import load_contraction_table
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-Array = NDArray[np.float64]
 
 SOURCE = "positioning2021"
 MM, BAR = 1e3, 1e-5
@@ -112,10 +108,8 @@ def positioning_errors() -> Iterator[Figure]:
             yield Figure(f"{name}: {what}", MM * value, "mm", where, **more)  # type: ignore[arg-type]
     without = table["one cubic for both branches"].rms
     ratio, words = table["published"].rms / without, "increase positioning accuracy"
-    name, why = (
-        "Eqs. (7) to (12) over one cubic without hysteresis, RMS",
-        "Eq. (11) as printed: 4.0 mm RMS",
-    )
+    name = "Eqs. (7) to (12) over one cubic without hysteresis, RMS"
+    why = "Eq. (11) as printed: 4.0 mm RMS"
     yield Figure(name, ratio, "", where, at_most=1.0, claim=words, why=why)
     ratio = without / table["pchip"].rms
     where = f"{SOURCE}, section 4: inverse model"

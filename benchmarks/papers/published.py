@@ -1,7 +1,5 @@
 """Published figures compared with ours, each with its tolerance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, TypeVar

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.runs.controllers import ROOT, Controller
+from pam_envs.arrays import Array
 from sweeps.worker import is_needed
 
 LONGEST = 300  # largest number of characters of a message in a row
 
 REPLAYED = 100  # steps of an episode that are repeated with a single row after a run in a batch
 
-Array = NDArray[np.float64]
 Watch = Callable[[Any], None]
 
 

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from benchmarks.scenarios.scenario import ScenarioSet
+from pam_envs.arrays import Array
 
-Array = NDArray[np.float64]
 Signals = Mapping[str, Array]
 
 POINTS = 400  # largest number of samples of a signal

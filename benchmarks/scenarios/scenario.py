@@ -9,8 +9,6 @@ scenarios of a grid the same reference and noise, and thus correlated errors. A 
 name in another track has the same seeds, for paired comparison of tracks.
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 from collections.abc import Iterator, Mapping

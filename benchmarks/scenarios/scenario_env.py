@@ -4,8 +4,6 @@ A scenario names only a registered environment and plants of this checkout, sinc
 third-party; ``gymnasium.make`` would import the module before a colon.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Mapping

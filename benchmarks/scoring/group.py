@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pam_envs.arrays import Array
+
 Mask = NDArray[np.bool_]
 Column = tuple[str, str, float]  # metric, heading and factor from SI
 

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.scoring import groups
-from benchmarks.scoring.group import EFFORT, Array, Column, Group, Mask, Record, rms
+from benchmarks.scoring.group import EFFORT, Column, Group, Mask, Record, rms
+from pam_envs.arrays import Array
 
 METRICS: dict[str, str] = {
     "rms_error": "m",

@@ -23,13 +23,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
+from pam_envs.arrays import Array, Indices
+
 BOOTSTRAP_SEED = 20_000_003
 RESAMPLES = 5000
 _BOUNDS = (0.025, 0.975)
 _LARGEST = 4_000_000  # limit of the size of an array of resamples
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Statistic = Callable[[Array], Array]
 
 

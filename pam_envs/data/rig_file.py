@@ -13,8 +13,6 @@
 Every key but ``plant`` may be missing.
 """
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import hashlib
@@ -25,12 +23,10 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import yaml
 
+from pam_envs.constants import BAR, MM
 from pam_envs.wording import near
 
 Load = Literal["hanging_mass", "constant_force"]
-
-BAR = 1e5
-MM = 1e-3
 
 
 class Bounds(NamedTuple):
@@ -156,7 +152,7 @@ class Rig:
             )
 
     @classmethod
-    def from_yaml(cls, path: str | Path) -> Rig:
+    def from_yaml(cls, path: str | Path) -> "Rig":
         """Read a rig file.
 
         Raises

@@ -9,8 +9,6 @@ before each reading. Hysteresis makes a reading depend on those before it: the a
 order.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from importlib import resources
 from pathlib import Path
@@ -18,12 +16,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.columns import RecordingError, Sheet, read_sheet, refuse, rows_text
 
-Array = NDArray[np.float64]
-
-BAR = 1e5
-MM = 1e-3
 LOAD_TOLERANCE = 1e-6
 """Two loads [kg] closer than this are the same load."""
 READINGS = ("load_kg", "pressure_bar", "direction", "repeat", "contraction_mm")
@@ -114,7 +110,7 @@ class ContractionTable:
         part = slice(None, top + 1) if inflating else slice(top, None)
         return pressure[part], contraction[part]
 
-    def without_repeat(self, repeat: int) -> ContractionTable:
+    def without_repeat(self, repeat: int) -> "ContractionTable":
         """Return the table without one repeat of every load; ValueError without it or others."""
         kept = self.repeat != repeat
         if kept.all() or not kept.any():

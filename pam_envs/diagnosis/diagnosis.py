@@ -1,7 +1,5 @@
 """Diagnose model error from a recording; extend the plant; quantify the improvement."""
 
-from __future__ import annotations
-
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.audit.audit import audit
 from pam_envs.diagnosis.audit.noise import ChannelFloor, Floor, noise_floor
 from pam_envs.diagnosis.cause import Cause
@@ -192,7 +190,7 @@ class Study:
     loop_reason: str | None = "it was not requested"
 
     @classmethod
-    def begin(cls, recording: Recording, sheet: Rig, plant: SingleMuscle, floor: Floor) -> Study:
+    def begin(cls, recording: Recording, sheet: Rig, plant: SingleMuscle, floor: Floor) -> "Study":
         """Fit the base parameters of a plant to a recording."""
         family = MuscleFamily(plant, inputs_of(recording, sheet))
         measured = np.full((len(family.channels), len(recording.time)), np.nan)

@@ -1,7 +1,5 @@
 """Registration of environment families with Gymnasium."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import pkgutil

@@ -1,15 +1,13 @@
 """Checks of a hysteresis model's arguments: every message names value, bound and remedy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from pam_envs.arrays import Array
 
 
 def floats(name: str, values: Sequence[float]) -> tuple[float, ...]:

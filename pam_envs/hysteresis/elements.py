@@ -5,19 +5,16 @@ of three exact numbers, so that a closed excursion of the input returns it to th
 incremental form ``clip(s + dx, -r, r)`` collects rounding errors.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.checks import series, single_rows
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.kernels.build import entry, kernel
-
-Array = NDArray[np.float64]
 
 LINEAR, THRESHOLD, WEIGHT = 1, 2, 2 + ELEMENTS
 """Rows of a play operator's numbers, counted from the slope."""

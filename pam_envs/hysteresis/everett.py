@@ -18,14 +18,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import kernel
 
 if TYPE_CHECKING:
     from pam_envs.hysteresis.maxwell_slip import PlayOperator
-
-Array = NDArray[np.float64]
 
 
 @kernel

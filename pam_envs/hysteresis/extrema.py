@@ -12,19 +12,13 @@ An output is always computed from a stored turn, never accumulated: intermediate
 to a turn change no bit.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.everett import everett
 from pam_envs.kernels.arithmetic import clip
 from pam_envs.kernels.build import LANES, entry, kernel, scratch
-
-Array = NDArray[np.float64]
 
 DEPTH = 24
 """Depth of the stack in the rows of a plant."""
@@ -304,12 +298,10 @@ def _list_leaving(
 
     Row 1 of ``leaving`` is 1 for a lane that continues along its branch.
     """
-    present, turn, bound, cell = (
-        rows[at + PRESENT],
-        rows[at + TURN],
-        rows[at + BOUND],
-        rows[at + CELL],
-    )
+    present = rows[at + PRESENT]
+    turn = rows[at + TURN]
+    bound = rows[at + BOUND]
+    cell = rows[at + CELL]
     staying = 0
     for j in range(first, last):
         held = _held(x[j], low[j], high[j])

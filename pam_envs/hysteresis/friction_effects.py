@@ -5,8 +5,6 @@ of ``x`` is ``sum_k c_k y_k`` with ``T_k y_k' = x - y_k``. Applied to the effect
 force creeps, applied to the length the position does.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

@@ -13,16 +13,15 @@ Control 50 (2005). P. Krejci, K. Kuhnen, "Inverse control of systems with hyster
 IEE Proc. Control Theory Appl. 148 (2001), for the inverse and its state.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.checks import check_not_negative, check_thresholds, floats, width_of
 from pam_envs.hysteresis.elements import ParallelElements, plays_lag, plays_peek, plays_step
 from pam_envs.hysteresis.everett import play_table
@@ -36,8 +35,6 @@ from pam_envs.hysteresis.protocol import (
     Usage,
     register,
 )
-
-Array = NDArray[np.float64]
 
 
 @register
@@ -112,7 +109,7 @@ class PlayOperator(ParallelElements, HysteresisModel):
                 "linear part above 0: scale the weights"
             )
 
-    def rows(self) -> PlayRows:
+    def rows(self) -> "PlayRows":
         """Return the operator and its inverse over rows of environments."""
         return PlayRows(self)
 
@@ -133,7 +130,7 @@ class PlayOperator(ParallelElements, HysteresisModel):
         x = self.inverse().step(y, self.inverse_state(state))[0]
         return x, self.step(x, state)[1]
 
-    def scaled(self, width: float, slope: float | None = None) -> PlayOperator:
+    def scaled(self, width: float, slope: float | None = None) -> "PlayOperator":
         """Return this operator with its hysteresis made ``width`` times as wide.
 
         The output is ``s x - width (s x - y)`` with ``s`` the total slope (whatever ``slope``): 0
@@ -158,7 +155,7 @@ class PlayOperator(ParallelElements, HysteresisModel):
             )
         return slopes
 
-    def inverse(self) -> MaxwellSlip:
+    def inverse(self) -> "MaxwellSlip":
         """Return the Maxwell-slip model that undoes this operator exactly.
 
         The inverse's initial loading curve is the mirror image of this operator's: its break
@@ -194,7 +191,7 @@ class PlayRows(Rows):
     operator: PlayOperator
 
     @cached_property
-    def _inverse(self) -> tuple[MaxwellSlip, Array]:
+    def _inverse(self) -> "tuple[MaxwellSlip, Array]":
         mirror = self.operator.inverse_state(np.eye(self.operator.elements)).T  # it is linear
         return self.operator.inverse(), mirror
 
@@ -259,7 +256,7 @@ class MaxwellSlip(ParallelElements):
         """The stiffness where every element slips: that of large amplitudes."""
         return self.spring
 
-    def scaled(self, width: float) -> MaxwellSlip:
+    def scaled(self, width: float) -> "MaxwellSlip":
         """Return this model with its hysteresis ``width`` times as wide, 0 for the spring alone."""
         width = width_of(width)
         return replace(self, stiffnesses=tuple(width * k for k in self.stiffnesses))

@@ -15,16 +15,15 @@ References: yeh2010, section 3; T.-J. Yeh, S.-W. Lu, T.-Y. Wu, "Modeling and ide
 hysteresis in piezoelectric actuators", J. Dyn. Sys., Meas., Control 128 (2006).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.checks import (
     check_not_negative,
     check_thresholds,
@@ -37,8 +36,6 @@ from pam_envs.hysteresis.elements import ParallelElements, play
 from pam_envs.hysteresis.everett import table_from_weights, weights_from_table
 from pam_envs.hysteresis.protocol import HysteresisModel, Kernels, Start, Usage, register
 from pam_envs.kernels.build import entry, kernel
-
-Array = NDArray[np.float64]
 
 FAR = 1e300
 MOST = 16
@@ -367,7 +364,7 @@ class ModifiedMaxwellSlip(ParallelElements, HysteresisModel):
         """Return the pressures, shape (T,), for stiffnesses of shape (T,), and the last state."""
         return self._record(stiffness, state, True)
 
-    def scaled(self, width: float, slope: float | None = None) -> ModifiedMaxwellSlip:
+    def scaled(self, width: float, slope: float | None = None) -> "ModifiedMaxwellSlip":
         """Return this model with its hysteresis ``width`` times as wide, 0 for none.
 
         The spring takes over the pressure of the elements at the tips of the major loop; the tips

@@ -1,7 +1,5 @@
 """No hysteresis: the identity, as a model of the protocol with no plays."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -33,7 +31,7 @@ class NoHysteresis(HysteresisModel):
     kernels: ClassVar[Kernels] = Kernels(identity_step, lag=plays_lag, peek=plays_peek)
     state_rows: ClassVar[int] = 0
 
-    def scaled(self, width: float, slope: float | None = None) -> NoHysteresis:
+    def scaled(self, width: float, slope: float | None = None) -> "NoHysteresis":
         """Return the identity."""
         return self
 

@@ -12,8 +12,6 @@ References
 I. D. Mayergoyz, "Mathematical Models of Hysteresis", Springer 1991, chapter 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,6 +20,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis import everett as maps
 from pam_envs.hysteresis.checks import floats, series, width_of
 from pam_envs.hysteresis.extrema import (
@@ -43,8 +42,6 @@ from pam_envs.hysteresis.protocol import (
     padded,
     register,
 )
-
-Array = NDArray[np.float64]
 
 SMALLEST_WEIGHT = -1e-12
 """Relay weights down to this part of the largest Everett value count as rounding errors."""
@@ -135,7 +132,7 @@ class Preisach(HysteresisModel):
     def from_weights(
         cls, weights: ArrayLike, low: float, high: float, depth: int = 24, start: Start = "low",
         start_output: float = 0.0,
-    ) -> Preisach:  # fmt: skip
+    ) -> "Preisach":  # fmt: skip
         """Return the operator with relay weights per cell, shape (n - 1, n - 1).
 
         ``weights[k][l]``, ``l <= k``, is the change of the output, in its unit, by the relays that
@@ -148,7 +145,7 @@ class Preisach(HysteresisModel):
     def from_density(
         cls, density: Callable[[Array, Array], ArrayLike], low: float, high: float,
         levels: int = 33, depth: int = 24, start: Start = "low",
-    ) -> Preisach:  # fmt: skip
+    ) -> "Preisach":  # fmt: skip
         """Return the operator of a density ``mu(alpha, beta)``, output per input squared.
 
         The density is taken at the middle of each cell; a cell on the diagonal, which is half a
@@ -165,7 +162,7 @@ class Preisach(HysteresisModel):
     def resembling(
         cls, reference: Any, low: float, high: float, levels: int = 33, start: Start = "low",
         depth: int = DEPTH,
-    ) -> Preisach:  # fmt: skip
+    ) -> "Preisach":  # fmt: skip
         """Return the operator with the Everett map of a reference model.
 
         For plays it is exact at the grid's inputs, and starts in their virgin state, or where they
@@ -174,11 +171,11 @@ class Preisach(HysteresisModel):
         table, output = reference.everett_map(low, high, levels, start)
         return cls(low, high, table, depth, start, output)
 
-    def plus_linear(self, slope: float) -> Preisach:
+    def plus_linear(self, slope: float) -> "Preisach":
         """Return this operator with ``slope * x`` added to its output."""
         return self._mixed(1.0, slope)
 
-    def scaled(self, width: float, slope: float | None = None) -> Preisach:
+    def scaled(self, width: float, slope: float | None = None) -> "Preisach":
         """Return this operator with its hysteresis made ``width`` times as wide.
 
         The output is ``s x - width (s x - y)`` with ``s`` the ``slope``, :attr:`total_slope`
@@ -188,7 +185,7 @@ class Preisach(HysteresisModel):
         s = self.total_slope if slope is None else slope
         return self._mixed(width, (1.0 - width) * s)
 
-    def _mixed(self, width: float, slope: float) -> Preisach:
+    def _mixed(self, width: float, slope: float) -> "Preisach":
         table = width * self.everett + slope * (self.levels[:, None] - self.levels)
         start = self.low if self.start == "low" else 0.0
         output = width * self.start_output + slope * start
@@ -266,7 +263,7 @@ class Preisach(HysteresisModel):
                 f"+-{usage.reach:g}: give a wider map"
             )
 
-    def rows(self) -> PreisachRows:
+    def rows(self) -> "PreisachRows":
         """Return the operator over rows of environments, whose state has the row first."""
         return PreisachRows(self)
 
@@ -287,7 +284,7 @@ class Preisach(HysteresisModel):
         return ("start",)
 
     @classmethod
-    def from_record(cls, record: Mapping[str, Any]) -> Preisach:
+    def from_record(cls, record: Mapping[str, Any]) -> "Preisach":
         """Return the operator of a record, virgin unless it names another start."""
         table = tuple(tuple(float(v) for v in row) for row in record["table"])
         start = record.get("start", "virgin")

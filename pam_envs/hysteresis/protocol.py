@@ -9,8 +9,6 @@ A model is one class in one file of this folder, marked :func:`register`. It off
 - a record for plant files, and a preset that resembles a reference model.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +17,9 @@ from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import LANES, kernel, scratch
 
-Array = NDArray[np.float64]
 Start = Literal["low", "virgin"]
 RowsState = tuple[NDArray[Any], ...]
 
@@ -264,7 +262,7 @@ class HysteresisModel:
     @classmethod
     def resembling(
         cls, reference: Any, low: float, high: float, levels: int, start: Start
-    ) -> HysteresisModel | None:
+    ) -> "HysteresisModel | None":
         """Return the model of this kind nearest to a reference model, for inputs low to high."""
         raise NotImplementedError
 

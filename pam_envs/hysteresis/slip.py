@@ -17,16 +17,15 @@ where the play of threshold ``r`` is above ``c``, so that ``phi_k`` is the integ
 density over ``c``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.checks import check_not_negative, check_thresholds, floats, width_of
 from pam_envs.hysteresis.elements import THRESHOLD, WEIGHT, play
 from pam_envs.hysteresis.protocol import (
@@ -39,8 +38,6 @@ from pam_envs.hysteresis.protocol import (
     register,
 )
 from pam_envs.kernels.build import entry, kernel
-
-Array = NDArray[np.float64]
 
 LIMIT = ELEMENTS
 """Row of the state, after the sliders, with the factor on the thresholds: the plant writes it."""
@@ -317,7 +314,7 @@ class StraightSlip(SlipModel):
     @classmethod
     def resembling(
         cls, reference: Any, low: float, high: float, levels: int, start: Start
-    ) -> StraightSlip:
+    ) -> "StraightSlip":
         """Return the elements of a play operator."""
         thresholds, weights, _ = reference.parts
         return cls(tuple(thresholds), tuple(weights))
@@ -327,7 +324,7 @@ class StraightSlip(SlipModel):
         """The weights, shape (n, 1)."""
         return np.array(self.weights)[:, None]
 
-    def scaled(self, width: float, slope: float | None = None) -> StraightSlip:
+    def scaled(self, width: float, slope: float | None = None) -> "StraightSlip":
         """Return the model with its lag ``width`` times as large."""
         width = width_of(width)
         return replace(self, weights=tuple(width * w for w in self.weights))
@@ -405,7 +402,7 @@ class PreisachSlip(SlipModel):
     @classmethod
     def resembling(
         cls, reference: Any, low: float, high: float, levels: int, start: Start
-    ) -> PreisachSlip:
+    ) -> "PreisachSlip":
         """Return the operator of a play operator: a density that is the same at any input."""
         thresholds, weights, _ = reference.parts
         return cls(low, high, tuple(thresholds), tuple((float(w),) for w in weights))
@@ -429,7 +426,7 @@ class PreisachSlip(SlipModel):
         """The densities, shape (n, cells)."""
         return np.array(self.densities)
 
-    def scaled(self, width: float, slope: float | None = None) -> PreisachSlip:
+    def scaled(self, width: float, slope: float | None = None) -> "PreisachSlip":
         """Return the operator with its lag ``width`` times as large."""
         width = width_of(width)
         return replace(self, densities=tuple(tuple(width * d for d in r) for r in self.densities))

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pam_envs.arrays import Array
 from pam_envs.data.tables import ContractionTable
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
@@ -27,8 +28,6 @@ from pam_envs.identification import length_friction as length
 from pam_envs.identification.preisach_forc import PreisachFit, fit_preisach
 from pam_envs.plants.single_muscle.hysteresis import Hysteresis, Kind
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-Array = NDArray[np.float64]
 
 THRESHOLDS = (1.0e4, 2.0e4, 3.5e4, 5.0e4, 7.5e4, 1.1e5)
 """Half dead widths of the play operators [Pa]; the readings are 0.5 bar apart."""

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.mechanics.leg import centre_of_pressure
 from pam_envs.muscle.emg import CONSTANTS, Reading, emg_proxy
@@ -23,8 +23,6 @@ from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE, gait_curves, shared_load
 from pam_envs.sensing.butterworth import PERIOD, filtered
 from pam_envs.sensing.shoe import estimated_torque, heel_load
-
-Array = NDArray[np.float64]
 
 PUBLISHED: dict[Activity, float] = {
     "walk": 0.07 / 0.11 - 1.0,

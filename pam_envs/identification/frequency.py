@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import null_space
 
-Array = NDArray[np.float64]
+from pam_envs.arrays import Array
+
 Complex = NDArray[np.complex128]
 
 ROUNDS = 60

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.references.gait import ACTIVITIES, FOLDER, SIGNALS
-
-Array = NDArray[np.float64]
 
 POINTS = 100
 SHANK = 0.43  # length of the shank [m] of the subject, knee to ankle

@@ -28,15 +28,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis import everett as maps
 from pam_envs.hysteresis.everett import everett
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification import preisach_forc as forc
 
-Array = NDArray[np.float64]
 Rig = Callable[[Array], Array]
 """From a series of inputs, shape (T,), to the outputs at rest after each, shape (T,)."""
 

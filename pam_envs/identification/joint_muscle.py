@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from pam_envs.arrays import Array
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
-
-Array = NDArray[np.float64]
 
 LOWEST, HIGHEST = -0.1, 0.4  # contractions between which a muscle rests
 

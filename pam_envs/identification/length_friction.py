@@ -8,8 +8,6 @@ readings do not determine follows from a prior: elements of equal slip force, an
 change little from element to element and from cell to cell.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 
@@ -17,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.slip import PreisachSlip, SlipModel, StraightSlip
 from pam_envs.plants.single_muscle.hysteresis import Hysteresis
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-Array = NDArray[np.float64]
 
 THRESHOLDS = np.array([0.002, 0.004, 0.008, 0.014, 0.022, 0.035])
 """Strains at which the elements slip, at the limit 1; the readings are about 1 % apart."""
@@ -47,7 +44,7 @@ class Columns:
     stiffnesses: Array
 
     @classmethod
-    def of(cls, vectors: Array, cells: int) -> Columns:
+    def of(cls, vectors: Array, cells: int) -> "Columns":
         """Return the sets of vectors of the fit, shape (q, 8 + n cells)."""
         made = np.exp(vectors[:, len(_START) :]).reshape(len(vectors), len(THRESHOLDS), cells)
         return cls(vectors[:, : len(_START)], made)

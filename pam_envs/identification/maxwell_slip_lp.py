@@ -33,14 +33,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
 from pam_envs.identification.preisach_forc import measured
 
-Array = NDArray[np.float64]
 Loop = tuple[ArrayLike, ArrayLike]
 Form = Literal["corrected", "printed"]
 

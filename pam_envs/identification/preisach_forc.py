@@ -21,13 +21,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis import everett as maps
 from pam_envs.hysteresis.extrema import preisach_step
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import Start
 from pam_envs.kernels.build import entry, kernel
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -15,8 +15,6 @@ box-constrained least squares in the limit of a weight on the torque alone. The 
 the same pressures by an optimisation.
 """
 
-from __future__ import annotations
-
 from pam_envs.kernels.build import kernel
 
 LEAST_SHAPE = 1e-9

@@ -11,22 +11,19 @@ With ``r_u = r_o = r`` and ``l_u = l_o = l`` the lengths are
 bends, so that equal forces push it further out.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed, derived
 
 _SIZE = "with it +-30 degrees take 0 to 25 % of a muscle of 150 mm (fluidic_muscles, section 2)"
 SIDES = (1.0, -1.0)
 """Of muscle A and of muscle B."""
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

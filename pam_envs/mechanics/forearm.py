@@ -8,8 +8,6 @@ his own; ``felt`` is the torque of the orthosis on him at cuff and handle. If ``
 moves the orthosis exactly, ``felt`` is 0 and the forearm follows the intended motion exactly.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pam_envs.constants import GRAVITY

@@ -1,7 +1,5 @@
 """Dry friction of a guide or a bearing: stick-slip motion with the Stribeck effect."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

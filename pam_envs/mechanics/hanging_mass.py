@@ -1,7 +1,5 @@
 """Mass on the free end of a muscle, its support and its mount."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

@@ -11,8 +11,6 @@ with ``tau_a`` positive in extension. The paper's Eq. (3) has the opposite sign 
 later a squared cosine, which the virtual work of ``T`` does not.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -26,8 +26,6 @@ assistance of the last strides and is forgotten (emken2007); the rest meets a st
 both muscle groups, so that assistance that comes as a surprise saves nothing.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pam_envs.constants import GRAVITY

@@ -6,18 +6,15 @@ Bundle b raises the angle, bundle a lowers it. Each has its nominal length at on
 range, where it is longest; beyond, stiff springs represent the mechanical stops.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed, published
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,6 @@ pressure, whose saturating part gives the threshold pressure of a short muscle. 
 with a Gaussian taper, fit published isometric maps of 10 mm muscles.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Effects of temperature, load, viscosity, creep of the length and friction of strands."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, ClassVar

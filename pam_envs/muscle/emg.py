@@ -14,8 +14,6 @@ tau_w``; *B* takes the EMG to be a power ``n`` of the torque. They count from th
 level, so that one constant is enough.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,8 +21,9 @@ from typing import Any, Literal
 
 import numpy as np
 import yaml
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import entry, kernel
 from pam_envs.parameters import assumed
@@ -32,7 +31,6 @@ from pam_envs.parameters import assumed
 Reading = Literal["uncalibrated", "A", "B"]
 READINGS: tuple[Reading, ...] = ("uncalibrated", "A", "B")
 CONSTANTS = Path(__file__).resolve().parent.parent / "data" / "emg_calibration.yaml"
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

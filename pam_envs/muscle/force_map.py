@@ -17,8 +17,6 @@ A. Martens, I. Boblan, "Modeling of the static force of a Festo pneumatic muscle
 Actuators 6 (2017) 33: the map.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@
 the one whose virtual work is this tension, ``T = -P dV/dL``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

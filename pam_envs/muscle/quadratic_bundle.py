@@ -14,18 +14,15 @@ The volume is the one whose virtual work is the pressure's share of the force,
 counted from that of ideal braided muscles at their nominal length.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import kernel
 from pam_envs.muscle.effects import TemperatureEffects
 from pam_envs.parameters import assumed, published
-
-Array = NDArray[np.float64]
 
 _FIT = "chakarov2018, Eq. (6)"
 _READ = (

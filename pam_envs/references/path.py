@@ -10,12 +10,11 @@ at 27.77; along a straight line of tip and direction at 39.0 and 28.2 degrees.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import kernel
 from pam_envs.kernels.random import seed_words, uniform
-
-Array = NDArray[np.float64]
 
 POINTS = 41  # poses of a path (fluidic_muscles's example)
 STREAM = 40  # random stream of drawn paths (one draw number an angle)

@@ -4,8 +4,6 @@ yeh2010, section 5.2, filters the assistive torque with it to obtain the referen
 signals by 163 ms.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

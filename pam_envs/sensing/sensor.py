@@ -3,8 +3,6 @@
 No noise of the orthoses' sensors is published; the defaults are of the order seen on public rigs.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """The pressure shoe: load on the heel, stance or swing, and the paper's estimate of knee torque."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pam_envs.constants import GRAVITY

@@ -1,7 +1,5 @@
 """Gait assistance: weights of the reward, soft and hard limits, desired assistance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pam_envs.kernels.build import kernel

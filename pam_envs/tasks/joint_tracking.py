@@ -1,7 +1,5 @@
 """Tracking with antagonistic joints: weights of the reward and soft limits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pam_envs.parameters import assumed

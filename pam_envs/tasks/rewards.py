@@ -1,7 +1,5 @@
 """Reward terms and soft-limit costs that tasks share."""
 
-from __future__ import annotations
-
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed
 

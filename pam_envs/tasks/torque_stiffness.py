@@ -8,8 +8,6 @@ stiffness for every angle of the elbow; flexion is positive, the upper arm hangs
 * *free* motion: no torque, and a low stiffness.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pam_envs.kernels.arithmetic import sine_and_cosine

@@ -1,7 +1,5 @@
 """Tracking of a contraction: weights of the reward, soft and hard limits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pam_envs.parameters import assumed, derived, published

@@ -19,6 +19,7 @@ from benchmarks.diagnosis.next import DrivenRig, OracleRig
 from benchmarks.diagnosis.report import figures
 from benchmarks.diagnosis.run import Options, run, select
 from benchmarks.diagnosis.study import study, trace_errors
+from benchmarks.runs.runner import Computing
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
 from pam_envs.diagnosis.decide.rule import Rule
@@ -29,16 +30,12 @@ ROOT = Path(__file__).resolve().parents[2]
 # --- which cases ---------------------------------------------------------------------------------
 
 
-def test_fractions_are_stratified_and_nested():
-    tenth, fifth = (select(Options("tune", fraction=f)) for f in (0.1, 0.2))
-    assert set(tenth) < set(fifth)
-    for name in hidden.EFFECTS:
-        assert sum(c.kind == "single" and c.names == (name,) for c in tenth) == 4
-    half = tenth[: len(tenth) // 2]
-    assert {case.kind for case in half} == {case.kind for case in cases("tune")}
-    assert sum(case.kind == "single" for case in half) == pytest.approx(50, abs=3)
-    assert select(Options("tune", fraction=0.1)) == tenth
-    assert select(Options("tune", fraction=0.1, limit=7)) == tenth[:7]
+def test_kinds_and_causes_are_mixed():
+    chosen = select(Options("tune"))
+    assert sorted(case.seed for case in chosen) == sorted(case.seed for case in cases("tune"))
+    half = chosen[: len(chosen) // 2]
+    assert {case.kind for case in half} == {case.kind for case in chosen}
+    assert select(Options("tune")) == chosen
 
 
 def test_kinds_and_names_are_chosen_and_wrong_ones_refused():
@@ -49,15 +46,12 @@ def test_kinds_and_names_are_chosen_and_wrong_ones_refused():
         select(Options(kinds=("double",)))
     with pytest.raises(ValueError, match="no effect is called 'magic'"):
         select(Options(names=("magic",)))
-    with pytest.raises(ValueError, match=r"fraction 0 is outside"):
-        select(Options(fraction=0))
 
 
 def test_options_reproduce_the_command_arguments():
-    options = Options("tune", 3, 0.1, ("single",), ("creep", "leak"), 5, 2, True)
+    options = Options("tune", 3, ("single",), ("creep", "leak"), 2, True)
     assert options.arguments == (
-        "--chosen tune --offset 3 --fraction 0.1 --kind single --name creep leak --limit 5 "
-        "--loops 2 --next"
+        "--chosen tune --offset 3 --kind single --name creep leak --loops 2 --next"
     )
     assert Options("final").whole and not options.whole
 
@@ -154,9 +148,10 @@ def test_records_belong_to_the_numbers_of_rule_and_causes(tmp_path, monkeypatch)
     assert run(options, act=answer).computed == 0
 
 
-def test_closed_loops_and_experiments_run_for_their_cases(tmp_path):
+def test_closed_loops_and_experiments_run_for_their_cases(tmp_path, monkeypatch):
+    monkeypatch.setattr(diagnosis, "cases", lambda *_: cases("tune")[::10])
     counting = Counting()
-    options = Options("tune", fraction=0.1, folder=tmp_path, loops=2, next=True)
+    options = Options("tune", folder=tmp_path, loops=2, next=True)
     report = run(options, act=counting)
     looped = [case for case, stage in counting.asked if stage == "loop"]
     assert {case.names[0] for case in looped} == set(COMPENSABLE)
@@ -188,7 +183,9 @@ def deadly(case: Case, stages: Collection[str]) -> dict[str, Any]:
 def test_case_that_kills_its_worker_is_recorded_as_failed(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
     get_reusable_executor().shutdown(wait=True)
-    options = Options(kinds=("single",), names=("creep", "leak"), folder=tmp_path, jobs=2)
+    options = Options(
+        kinds=("single",), names=("creep", "leak"), folder=tmp_path, computing=Computing(jobs=2)
+    )
     report = run(options, act=deadly)
     get_reusable_executor().shutdown(wait=True)
     assert [bool(record["failure"]) for record in report.records] == [False, True]
@@ -241,16 +238,12 @@ def test_traces_are_compared_on_the_output_with_the_largest_effect():
     assert errors["creep"]["found_raw"] > 4.0
 
 
-def made_rig(name: str) -> Any:
+@pytest.mark.parametrize("name", ["creep", "dead_time", "sensor_delay"])
+def test_oracle_equals_the_driven_rig_without_noise(name):
     effect = hidden.draw_effect(name, np.random.default_rng(1))
     base = hidden.draw_base(np.random.default_rng(3))
     ground = SimpleNamespace(base=base)
-    return SimpleNamespace(ground=ground, effects=[(effect, 3.0)], noise=NOISE)
-
-
-@pytest.mark.parametrize("name", ["creep", "dead_time", "sensor_delay"])
-def test_oracle_equals_the_driven_rig_without_noise(name):
-    made = made_rig(name)
+    made = SimpleNamespace(ground=ground, effects=[(effect, 3.0)], noise=NOISE)
     rig, oracle = DrivenRig(made, 30.0, 24.0), OracleRig(made, 30.0, 24.0)
     commands = np.repeat(np.random.default_rng(0).uniform(0.0, 5e5, 6), 30)
     ahead = oracle.try_ahead(np.stack([commands, 0.5 * commands], axis=1), len(commands))

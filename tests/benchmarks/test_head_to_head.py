@@ -74,7 +74,7 @@ def test_rig_shares_no_code_with_the_fitted_model():
     tree = ast.parse(Path(mass_spring_damper_rig.__file__).read_text(encoding="utf-8"))
     names = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     names |= {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
-    assert names == {"__future__", "math", "dataclasses", "numpy", "numpy.typing"}
+    assert names == {"math", "dataclasses", "numpy", "numpy.typing"}
 
 
 @pytest.mark.parametrize("cause", CAUSES, ids=lambda c: c.name)

@@ -5,8 +5,6 @@ uncompiled (each hysteresis, mounting and regulator has machine code of its own,
 minute to make), ``LIVELY`` makes every signal of the observation vary over episodes.
 """
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Tests of environments with common machine code run in one process, which compiles it once."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import pytest
 

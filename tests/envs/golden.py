@@ -4,8 +4,6 @@
 replaces the file, which a change of results needs (and a line under "Changed results").
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sys

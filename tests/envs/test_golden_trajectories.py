@@ -1,7 +1,5 @@
 """Trajectories equal the committed hashes, for every environment and hysteresis model."""
 
-from __future__ import annotations
-
 import os
 import platform
 import subprocess

@@ -1,7 +1,5 @@
 """Hysteresis model added by one file, for plants, environments, files and batches."""
 
-from __future__ import annotations
-
 import importlib.util
 import textwrap
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Bits of the hysteresis operators, compiled and as plain Python."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Plays and stops: hysteresis properties to the last bit, duality, and energy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Modified Maxwell-slip model: forward and inverse, hysteresis, energy."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Preisach operator: sum of relays, hysteresis properties, inverse."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -319,64 +317,6 @@ def test_output_out_of_reach_gives_the_end_of_the_range():
     operator = Preisach.from_weights(np.tril(np.ones((CELLS, CELLS))), LOW, HIGH)
     x = invert(operator, np.array([1e3, -1e3]), operator.initial_state())
     np.testing.assert_allclose(x, [HIGH, LOW])
-
-
-class InvertedMap:
-    """Eqs. (3.4) and (3.5): a series over the inverted Everett map, taken as an Everett map."""
-
-    def __init__(self, operator: Preisach) -> None:
-        self.operator = operator
-
-    def g(self, a: float, b: float) -> float:
-        if a < b:
-            return -self.g(b, a)
-        up, state = self.operator.inverse_step(a, self.operator.initial_state())
-        down, _ = self.operator.inverse_step(b, state)
-        return float(up - down)
-
-    def __call__(self, extremes: Array) -> float:
-        chain = [self.operator.start_output, *extremes]
-        return self.operator.low + sum(self.g(new, old) for old, new in pairwise(chain))
-
-
-def worst_inverses(operator: Preisach, reversals: int) -> tuple[float, float]:
-    """Return the largest errors of the series and of the recursion, in parts of the range."""
-    rng = np.random.default_rng(reversals)
-    series, recursion = 0.0, 0.0
-    for _ in range(20):
-        x = [rng.uniform(0.6, 0.9)]
-        low = LOW
-        for k in range(reversals):  # nested turns: all of them dominant
-            other = low if k % 2 == 0 else max(x[-2:])
-            x.append(x[-1] + rng.uniform(0.4, 0.8) * (other - x[-1]))
-            low = x[-1] if k % 2 == 0 else low
-        y, _ = operator.simulate(x)
-        series = max(series, abs(InvertedMap(operator)(y) - x[-1]))
-        found = invert(operator, y, operator.initial_state())[-1]
-        recursion = max(recursion, abs(found - x[-1]))
-    return series / (HIGH - LOW), recursion / (HIGH - LOW)
-
-
-def inhomogeneous(a: Array, b: Array) -> Array:
-    return 1.0 + 0.4 * (a - b) + 0.3 * (a + b) ** 2
-
-
-def of_difference(a: Array, b: Array) -> Array:
-    return 1.0 + 0.4 * (a - b)
-
-
-@pytest.mark.parametrize("reversals", range(4))
-def test_recursion_is_exact_and_inverted_map_up_to_one_reversal(reversals):
-    operator = Preisach.from_density(inhomogeneous, LOW, HIGH, 33).plus_linear(0.5)
-    assert symmetry_error(operator.table) < 1e-12
-    series, recursion = worst_inverses(operator, reversals)
-    assert recursion < 1e-9
-    assert series < 1e-9 if reversals < 2 else series > 3e-3
-
-
-def test_inverted_map_holds_for_a_density_of_the_difference():
-    operator = Preisach.from_density(of_difference, LOW, HIGH, 129).plus_linear(0.5)
-    assert worst_inverses(operator, 3)[0] < 2e-4  # the grid; it falls with the cell
 
 
 # --- maps ----------------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """Friction elements driven by length: duality with plays, relays, passivity, kernels."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -97,10 +97,8 @@ def test_noise_or_a_turn_between_breaks_adds_no_rank(segments, rank, noise):
     for n in segments:
         up = np.linspace(0.0, n * EVEN.segment, round(40 * n) + 1)
         path = np.concatenate([up, up[-2::-1]])
-        pressure, seen = (
-            EVEN.inverse_simulate(path)[0],
-            path + noise * FULL * rng.normal(size=path.size),
-        )
+        pressure = EVEN.inverse_simulate(path)[0]
+        seen = path + noise * FULL * rng.normal(size=path.size)
         loops.append((pressure, np.concatenate([[0.0], seen[1:]])))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OpenParameters)

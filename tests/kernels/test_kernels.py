@@ -1,7 +1,5 @@
 """Arithmetic without libm, random numbers, and the builder of kernels."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

@@ -17,7 +17,6 @@ from pam_envs.mechanics.redundancy.newton import (
 )
 from pam_envs.mechanics.redundancy.resolution import (
     LIMIT,
-    Resolution,
     UnreachablePose,
     nearest,
     resolve,
@@ -294,14 +293,3 @@ def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         redundancy, "_built", lambda n: interpreted(resolve_path, {"N_STAGES": n, "LANES": 1})
     )
-
-
-def test_compiled_and_uncompiled_give_the_same_bits(monkeypatch):
-    poses = ARM.pose(joint_line(START, END, 7))
-    built: list[Resolution] = [resolve(ARM, poses, weighted=w) for w in (True, False)]
-    uncompiled(monkeypatch)
-    for weighted, one in zip((True, False), built, strict=True):
-        plain = resolve(ARM, poses, weighted=weighted)
-        np.testing.assert_array_equal(plain.angles, one.angles)
-        np.testing.assert_array_equal(plain.multipliers, one.multipliers)
-        np.testing.assert_array_equal(plain.iterations, one.iterations)

@@ -1,7 +1,5 @@
 """Modes of the published frequency response."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import signal

@@ -1,7 +1,5 @@
 """On/off valves: opening times, mass flow, pressures of the chamber."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from benchmarks.scoring import group
+from pam_envs.arrays import Array
 
 _COMMON = {"model_rms_error": "rad", "saturated_time": "1", "slack_time": "1"}
 """Shares of time are of a setpoint out of reach, and of a slack muscle."""
@@ -65,7 +66,7 @@ def of_joint(record: group.Record) -> dict[str, float]:
     }
 
 
-def path_length(signals: Mapping[str, group.Array]) -> group.Array:
+def path_length(signals: Mapping[str, Array]) -> Array:
     """Return the path length of the desired pose, shape (n,), constant while the pose rests."""
     desired = np.array([signals[f"state/reference_{k}"] for k in (*POSITION, *DIRECTION)])
     steps = np.linalg.norm(np.diff(desired, axis=1), axis=0)

@@ -9,17 +9,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.scoring.group import (
-    DEGREES,
-    EFFORT,
-    RMS_PERCENT,
-    Array,
-    Column,
-    Group,
-    Mask,
-    Record,
-    rms,
-)
+from benchmarks.scoring.group import DEGREES, EFFORT, RMS_PERCENT, Column, Group, Mask, Record, rms
+from pam_envs.arrays import Array
 from pam_envs.muscle.emg import EmgProxy, Reading, calibration, emg_proxy
 
 GAIT_UNITS = {

@@ -1,18 +1,12 @@
 """Clock of a recording: gaps and jitter, and resampling to even steps."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pam_envs.arrays import Array, Flags, Indices
 from pam_envs.data.recording.columns import rows_text
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 SLOWEST = 0.2
 """Longest period [s] at which the motion of a muscle is still seen."""

@@ -1,7 +1,5 @@
 """Columns of a file of measurements: header, cells and their faults."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,9 +9,9 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.wording import near
 
-Array = NDArray[np.float64]
 SHOWN = 5
 """Largest number of rows that a message names."""
 
@@ -50,7 +48,7 @@ class RecordingError(ValueError):
         text = "".join(f"\n- {p}" for p in self.problems) if many else " " + self.problems[0]
         super().__init__(f"{where}:{text}")
 
-    def __reduce__(self) -> tuple[type[RecordingError], tuple[str, tuple[str, ...]]]:
+    def __reduce__(self) -> "tuple[type[RecordingError], tuple[str, tuple[str, ...]]]":
         """Let the error travel between processes."""
         return type(self), (self.where, self.problems)
 

@@ -6,8 +6,6 @@
 :func:`read_input` also takes settled readings without time, see :mod:`pam_envs.data.tables`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 from collections.abc import Sequence
@@ -15,8 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array, Flags, Indices
+from pam_envs.constants import BAR, MM
 from pam_envs.data.recording import clock as clocks
 from pam_envs.data.recording.columns import (
     RecordingError,
@@ -26,7 +26,7 @@ from pam_envs.data.recording.columns import (
     refuse,
     rows_text,
 )
-from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.data.rig_file import Rig
 from pam_envs.data.tables import READINGS, ContractionTable, load_readings
 from pam_envs.wording import near
 
@@ -41,9 +41,6 @@ __all__ = [
     "repeat_rows",
 ]
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 COLUMNS = (
     "time_s",
@@ -136,7 +133,7 @@ class Recording:
     filled: Flags
     row: Indices
     notes: tuple[str, ...] = ()
-    raw: Recording | None = dataclasses.field(default=None, repr=False)
+    raw: "Recording | None" = dataclasses.field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -160,7 +157,7 @@ class Recording:
         force: ArrayLike | None = None,
         valve_closed: Sequence[str] = (),
         source: str = "arrays",
-    ) -> Recording:
+    ) -> "Recording":
         """Make a recording of arrays in SI, checked as a file is.
 
         Parameters

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pam_envs.constants import BAR
 from pam_envs.data.recording.recording import Recording, check_rig, repeat_rows
 from pam_envs.data.rig_file import Rig
 from pam_envs.data.tables import ContractionTable
@@ -17,7 +18,6 @@ from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.fit.single_muscle import BASE
 from pam_envs.diagnosis.fit.tolerance import LOAD, unknown_names
 
-BAR = 1e5
 LOAD_STEP = 0.5  # largest difference of loads of one level [N]
 REST_PRESSURE = 0.1e5
 REST_SECONDS = 2.0

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from pam_envs.arrays import Array, Flags
 from pam_envs.data.recording.columns import rows_text, span_text
 from pam_envs.data.recording.recording import Recording
-from pam_envs.diagnosis.arrays import Array, Flags
 from pam_envs.diagnosis.audit.noise import half_width, resolution
 
 UNITS = {

@@ -13,9 +13,10 @@ import numpy as np
 from scipy.linalg import toeplitz
 from scipy.optimize import nnls
 
+from pam_envs.arrays import Array, Indices
+from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.recording import Recording, repeat_rows
-from pam_envs.data.rig_file import BAR, MM, Rig
-from pam_envs.diagnosis.arrays import Array, Indices
+from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.repeats import DISAGREE, Source, Trust, best, detrended
 
 CHANNELS = {"contraction": ("mm", MM), "pressure": ("bar", BAR)}

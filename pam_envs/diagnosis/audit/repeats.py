@@ -1,14 +1,12 @@
 """Test whether repeated segments differ by noise alone."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 
 Source = Literal["repeats", "holds", "innovations", "declared"]
 
@@ -27,7 +25,7 @@ class Trust:
     fast: float  # ratio of the scatter of repeats to that of holds within a second
 
     @classmethod
-    def of(cls, differences: list[Array], ends: list[Array], second: int, white: float) -> Trust:
+    def of(cls, differences: list[Array], ends: list[Array], second: int, white: float) -> "Trust":
         """Compare pieces with ``second`` samples per second; ``white`` replaces missing holds."""
         squares = _mean_squares([d - d.mean() for d in differences], 2 * second)
         spread = np.nan

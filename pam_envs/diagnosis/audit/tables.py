@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 from scipy import stats
 
+from pam_envs.arrays import Array
+from pam_envs.constants import MM
 from pam_envs.data.tables import ContractionTable, one_path
-from pam_envs.diagnosis.arrays import Array
 
-MM = 1e-3
 SIGNIFICANT = 0.05
 TREND = 2.5  # absolute t value above which a trend over the repeats is reported
 FEW_LOADS = {

@@ -4,12 +4,10 @@ import math
 
 import numpy as np
 
-from pam_envs.constants import GRAVITY
+from pam_envs.constants import BAR, GRAVITY, MM
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 
-BAR = 1e5
-MM = 1e-3
 PRESSURES = {
     "kPa": (100.0, "divide by 100"),
     "MPa": (0.1, "multiply by 10"),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.closed_loop.plant_inverse import PREVIEW, Controller, Rig, Simulated
 from pam_envs.diagnosis.closed_loop.plant_inverse import design as default_design

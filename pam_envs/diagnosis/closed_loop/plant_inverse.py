@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.plants.core.stepper import PlantStepper
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import stdtr
 
-from pam_envs.diagnosis.arrays import Indices
+from pam_envs.arrays import Indices
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, refit

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array, Flags, Indices
 from pam_envs.data.recording.recording import Recording
-from pam_envs.diagnosis.arrays import Array, Flags, Indices
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import (
     Candidate,

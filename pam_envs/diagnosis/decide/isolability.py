@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.audit.audit import undecidable
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS, EVERY

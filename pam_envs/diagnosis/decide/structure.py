@@ -3,8 +3,6 @@
 None of this names a cause; it shows whether anything is left to explain.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,7 +11,7 @@ from scipy.ndimage import median_filter
 from scipy.signal import lfilter, welch
 from scipy.stats import chi2
 
-from pam_envs.diagnosis.arrays import Array, Flags
+from pam_envs.arrays import Array, Flags
 from pam_envs.diagnosis.fit.blocks import Blocks
 
 BINS = 12
@@ -43,7 +41,7 @@ class Regressors:
         outputs: Array,
         load: Array,
         temperature: Array | None,
-    ) -> Regressors:
+    ) -> "Regressors":
         """Return the regressors of a recording and the simulated outputs (2, T)."""
         x, p = outputs
         period = float(time[1] - time[0])

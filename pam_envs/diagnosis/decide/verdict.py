@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array, Indices
+from pam_envs.arrays import Array, Indices
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.decide import compare
 from pam_envs.diagnosis.decide.compare import cross_validate

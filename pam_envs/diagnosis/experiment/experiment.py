@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY, ROOM_TEMPERATURE
-from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.experiment.plans import PERIOD, Means, Plan, plans
 from pam_envs.diagnosis.fit.least_squares import Fit, column_of, shifted

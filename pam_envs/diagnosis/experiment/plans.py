@@ -4,17 +4,16 @@ Loads, pressures, a closed valve and a warmer muscle are proposed only if the re
 the rig has them; no experiment exceeds the recorded loads and the largest recorded command.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR
 from pam_envs.data.recording.recording import Recording
-from pam_envs.data.rig_file import BAR, Rig
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import load_levels
 
 PERIOD = 0.02
@@ -32,7 +31,7 @@ class Means:
     warm: bool  # the muscle's temperature is measured
 
     @classmethod
-    def of(cls, recording: Recording, rig: Rig) -> Means:
+    def of(cls, recording: Recording, rig: Rig) -> "Means":
         """Return the capabilities that a recording shows."""
         return cls(
             full=float(recording.command.max()),

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 
 WIDTH, LEFT, RIGHT = 900.0, 62.0, 18.0  # width of a figure, and its margins for ticks and labels
 INSIDE = WIDTH - LEFT - RIGHT

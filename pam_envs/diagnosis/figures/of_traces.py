@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.figures import canvas as cv
 from pam_envs.diagnosis.figures import quantities as tv
 

@@ -1,7 +1,5 @@
 """Quantities of a report, and time series in display units: spans, windows, envelopes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 
 CHANNELS = ("contraction", "pressure")
 UNITS = {"contraction": ("mm", 1e3), "pressure": ("bar", 1e-5)}
@@ -61,7 +59,7 @@ class View:
         return [self.measured[channel] - model[channel] for model in models]
 
     @classmethod
-    def of(cls, traces: Any) -> View:
+    def of(cls, traces: Any) -> "View":
         """Convert the time series of a diagnosis from SI to display units."""
         segment = np.asarray(traces.segment, dtype=np.int64)
         command = _optional(traces.command)

@@ -1,12 +1,10 @@
 """Blocks of time that are held out in turn, and gains between models on them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array, Flags, Indices
+from pam_envs.arrays import Array, Flags, Indices
 
 BLOCK_SECONDS = 4.0  # length of the interleaved blocks [s]
 EVERY = 3  # period of the held-out blocks: every third one
@@ -21,7 +19,7 @@ class Blocks:
     counts: Array  # (channels, n): number of readings in each block
 
     @classmethod
-    def make(cls, time: Array, measured: Array) -> Blocks:
+    def make(cls, time: Array, measured: Array) -> "Blocks":
         """Divide a record into blocks, every third one held out."""
         of = ((time - time[0]) / BLOCK_SECONDS + 1e-9).astype(np.int64)
         n = int(of.max()) + 1

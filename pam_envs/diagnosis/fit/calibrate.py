@@ -6,8 +6,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import lsq_linear
 
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
-from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
 from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of, evaluate, improve

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.cause import Cause, Form
 from pam_envs.diagnosis.fit import least_squares as lsq
 from pam_envs.diagnosis.fit.blocks import Blocks

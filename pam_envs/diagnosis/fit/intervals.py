@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import complete_jacobian
 from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, normal_equations

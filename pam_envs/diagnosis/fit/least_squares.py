@@ -6,8 +6,6 @@ base) and differ in a few more (a cause) share the base's Jacobian, computed onc
 optimum: near it the steps are close to Gauss-Newton, at a tenth of the simulations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array, Flags, Indices
+from pam_envs.arrays import Array, Flags, Indices
 
 DAMPINGS = (1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
 """Levenberg-Marquardt dampings tried side by side, each in a lane of the replay."""
@@ -98,7 +96,7 @@ class Fit:
     begins: dict[Any, Any] = field(default_factory=dict, repr=False)  # starting points by form
 
     @classmethod
-    def at_start(cls, frees: tuple[Free, ...], column: Array) -> Fit:
+    def at_start(cls, frees: tuple[Free, ...], column: Array) -> "Fit":
         """Return a fit at the starting values of its parameters."""
         return cls(frees, np.array([f.inner(f.start) for f in frees]), column)
 

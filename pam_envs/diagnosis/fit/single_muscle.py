@@ -1,7 +1,5 @@
 """Single muscle as a diagnosable plant: recorded inputs, base parameters, parameter columns."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -9,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.constants import CELSIUS, GRAVITY
-from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.parameters import declarations
@@ -69,7 +67,7 @@ class MuscleFamily:
     scales = (1e-3, 1e5)
     units = ("mm", "bar")
 
-    def finer(self, step: float) -> MuscleFamily:
+    def finer(self, step: float) -> "MuscleFamily":
         """Return the family with another longest sub-step of the simulation [s]."""
         return dataclasses.replace(self, inputs=dataclasses.replace(self.inputs, longest_step=step))
 

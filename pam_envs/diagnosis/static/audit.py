@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.data.tables import BAR, MM, ContractionTable
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
+from pam_envs.data.tables import ContractionTable
 from pam_envs.diagnosis.static.compare import Model, Study, pure_error
 from pam_envs.diagnosis.static.fit import fit
 

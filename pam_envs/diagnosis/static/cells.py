@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.data.tables import LOAD_TOLERANCE, MM, ContractionTable
-from pam_envs.diagnosis.arrays import Array, Flags, Indices
+from pam_envs.arrays import Array, Flags, Indices
+from pam_envs.constants import MM
+from pam_envs.data.tables import LOAD_TOLERANCE, ContractionTable
 
 THRESHOLDS = (1 / 24, 1 / 16, 1 / 12, 1 / 8, 3 / 16)
 """Thresholds of the play operators over the highest pressure."""

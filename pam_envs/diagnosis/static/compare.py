@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy import stats
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.fit import Fit, base_starts, extend, fit, improve, jacobian
 from pam_envs.diagnosis.static.models import Term, predict

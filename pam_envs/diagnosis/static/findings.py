@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.data.tables import ContractionTable
-from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static import compare
 from pam_envs.diagnosis.static.audit import SetPoint, missed_set_points
 from pam_envs.diagnosis.static.compare import floor

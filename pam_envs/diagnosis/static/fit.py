@@ -6,14 +6,12 @@ dampings of few fits instead). A model with a term also starts from the optimum 
 not fit worse; this is checked, since a failed optimiser must not count as evidence.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.models import Number, Term, lags_of, numbers_of, predict
 
@@ -45,7 +43,7 @@ class Fit:
         """Return the fit to all data (the first lane)."""
         return _named(self.numbers, self.theta[:1])
 
-    def first(self, n: int) -> Fit:
+    def first(self, n: int) -> "Fit":
         """Return the first ``n`` lanes."""
         return Fit(self.terms, self.theta[:n], self.cost[:n])
 

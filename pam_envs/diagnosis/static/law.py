@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.static import compare
 from pam_envs.diagnosis.static.compare import interval
 from pam_envs.diagnosis.static.models import DEAD_LOAD, EXPONENT, Term, units

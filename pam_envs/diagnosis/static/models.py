@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pam_envs.data.tables import BAR, MM
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
 from pam_envs.diagnosis.static.cells import THRESHOLDS, Cells, stops
 
 WEIGHTS = tuple(f"weight_{i}" for i in range(1, len(THRESHOLDS) + 1))

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.data.tables import BAR, MM, ContractionTable
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR, MM
+from pam_envs.data.tables import ContractionTable
 from pam_envs.diagnosis.audit.tables import audit_table
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.static import compare

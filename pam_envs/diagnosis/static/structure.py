@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.decide.structure import pooled_ljung_box, since
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.compare import Model, Study, beyond, slopes

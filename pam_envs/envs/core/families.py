@@ -1,7 +1,5 @@
 """Kernels of a family of environments: the common step with the family's functions in it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -3,8 +3,6 @@
 Filling it takes longer than simulating the plant, and most steps of a learning run never read it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

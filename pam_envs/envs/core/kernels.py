@@ -3,8 +3,6 @@
 ``info`` and ``at`` are a family's named tuples of work rows and of numbers in the configuration.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, KEY_A, KEY_B, PERIOD

@@ -1,7 +1,5 @@
 """Row numbers by name: each quantity of a kernel is declared once, with its name and its row."""
 
-from __future__ import annotations
-
 from collections import namedtuple
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any

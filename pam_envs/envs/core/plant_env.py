@@ -1,7 +1,5 @@
 """The single environment, around any plant."""
 
-from __future__ import annotations
-
 from math import isfinite
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Configuration of an environment: checked, laid out as arrays for the kernels, and given to it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass

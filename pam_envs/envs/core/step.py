@@ -23,8 +23,6 @@ Arguments of the kernels, of every family:
   state and references are written before ``env_evaluate``, which writes the rest.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.envs.core.layout import indices

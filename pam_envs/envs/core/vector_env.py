@@ -1,7 +1,5 @@
 """The batch of environments: the same step over rows, in tiles of lanes and over cores."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym

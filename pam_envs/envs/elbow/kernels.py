@@ -4,8 +4,6 @@ The model computations (estimates, references, allocation of pressures) use the 
 the readings, and neglect friction.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 
@@ -286,11 +284,9 @@ def begin_elbow(
     """Bring lane ``j`` to rest where the wearer holds it, and draw motion and object."""
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
     model = settings[choices[CHOICE.at_own]]
-    low, high, window = (
-        config[L.CONFIG.motion_low],
-        config[L.CONFIG.motion_high],
-        config[L.CONFIG.window],
-    )
+    low = config[L.CONFIG.motion_low]
+    high = config[L.CONFIG.motion_high]
+    window = config[L.CONFIG.window]
     draw_motion(rows, L.MOTION, j, key_a, key_b, choices[L.CHOICE.motion], low, high, window)
     draw_object(rows, counts, settings, choices, j)
     angle, _, _ = motion_at(rows, L.MOTION, j, 0.0)

@@ -1,7 +1,5 @@
 """Rows, report, observation and configuration of the elbow orthosis kernels."""
 
-from __future__ import annotations
-
 from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import FIRST_CHOICE, FIRST_CONFIG
 from pam_envs.parameters import declarations

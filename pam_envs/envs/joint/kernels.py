@@ -1,7 +1,5 @@
 """Kernels of ``PAM/AntagonisticJoint-v0``: actions, disturbance, report, start."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

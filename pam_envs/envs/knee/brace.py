@@ -29,8 +29,6 @@ Arguments: :func:`make_setup`, and those of every environment
 (:class:`~pam_envs.envs.core.arguments.Common`). Versions: v0, the first.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache, partial
 
 from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments

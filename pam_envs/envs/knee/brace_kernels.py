@@ -1,7 +1,5 @@
 """Kernels of ``PAM/KneeTension-v0`` and ``PAM/KneeStiffness-v0``: sensors, report, start."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -4,8 +4,6 @@ The preview shows the references of the planned stride: from path and pace of th
 the nominal parameters of body and brace, before randomisation.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -38,8 +38,6 @@ Arguments: :func:`make_setup`, and those of every environment
 (:class:`~pam_envs.envs.core.arguments.Common`). Versions: v0, the first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache, partial
 from typing import Any

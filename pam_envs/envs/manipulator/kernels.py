@@ -4,8 +4,6 @@ A path is a table of poses and of planned joint angles, made before the first st
 one of them; the tool moves along it and back with minimum jerk.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Any

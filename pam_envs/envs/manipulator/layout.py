@@ -4,8 +4,6 @@ Quantities of every joint are blocks of ``MOST_STAGES`` rows in the state, and c
 and observation.
 """
 
-from __future__ import annotations
-
 from pam_envs.envs.core.layout import Report, computed, indices
 from pam_envs.envs.core.step import FIRST_CHOICE, FIRST_CONFIG
 from pam_envs.plants.redundant_manipulator import rows as M

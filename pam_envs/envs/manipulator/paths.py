@@ -1,13 +1,11 @@
 """Reference paths of a manipulator's tool, with planned joint angles."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.envs.core.setup import check_choice
 from pam_envs.envs.manipulator.layout import N_POSE
 from pam_envs.kernels.build import interpreted
@@ -17,8 +15,6 @@ from pam_envs.mechanics.serial_chain.kernels import place_chain, pointing_row, t
 from pam_envs.plants.antagonistic_joint.statics import bearable_payload
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.references.path import PATHS, draw_ends, joint_line
-
-Array = NDArray[np.float64]
 
 NAMES = tuple(path.name for path in PATHS)
 REFERENCES = (*NAMES, "paths", "drawn")

@@ -1,7 +1,5 @@
 """Kernels of ``PAM/MusclePositioning-v0``: load change, report, reward, start."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -17,8 +17,6 @@ straight, where the Jacobian loses rank. Each pose starts from the solution of t
 the beginning of a path, and where that fails, bent poses are tried.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -6,8 +6,6 @@ fluidic_muscles, section 2. The weight grows without bound towards the limits, s
 optimum within them is always found; the unweighted variant minimises ``q'q`` and has no limits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,12 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import COMPILED, build
 from pam_envs.mechanics.redundancy.newton import TASK, resolve_path
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.mechanics.serial_chain.kernels import work_rows
-
-Array = NDArray[np.float64]
 
 LIMIT = float(np.deg2rad(30.0))
 """Largest angle of a joint [rad] (fluidic_muscles, section 2)."""

@@ -9,20 +9,17 @@ These are textbook formulas, by Jacobians; the kernels of ``kinematics`` and ``d
 the same numbers recursively, for lanes side by side.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.parameters import assumed
-
-Array = NDArray[np.float64]
 
 MOST_JOINTS = 12
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

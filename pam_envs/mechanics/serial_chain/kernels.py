@@ -22,8 +22,6 @@ of ``n`` joints:
     (n + 1) * BLOCK_ROWS   frame behind each joint, the base's first
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.arithmetic import sine_and_cosine

@@ -204,11 +204,6 @@ def test_parallel_searches_propose_different_settings(tmp_path, monkeypatch):
     assert proposed[1] != proposed[2]
 
 
-def test_search_seeds_differ_from_reported_seeds():
-    assert min(tune.TRAINING_SEEDS) >= 10_000
-    assert len(set(tune.TRAINING_SEEDS)) == 2
-
-
 def test_search_needs_evaluations(tmp_path):
     blind = tune.Job(tiny(), 1, 256, 0, tmp_path / "s.db")
     with pytest.raises(SettingsError, match=r"evaluation.episodes = 0"):

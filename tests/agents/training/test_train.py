@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import torch
 import yaml
-from short_runs import ID, KINDS, QUIET, Killed, killed_after, kind, tiny, trained
+from short_runs import ID, KINDS, QUIET, killed_after, kind, tiny, trained
 from stable_baselines3.common.evaluation import evaluate_policy
 
 from agents.__main__ import main
@@ -78,21 +78,6 @@ def test_a_killed_process_resumes_from_the_command_line(tmp_path):
     assert not list(folder.glob("*.tmp"))
     whole = (tmp_path / "whole" / "policy.onnx").read_bytes()
     assert (folder / "policy.onnx").read_bytes() == whole
-
-
-def test_an_interrupted_write_leaves_the_old_checkpoint(tmp_path, monkeypatch):
-    file = tmp_path / CHECKPOINT
-    checkpoint.save(file, {"a": np.arange(3)})
-    before = file.read_bytes()
-
-    def power_cut(*_: Any) -> None:
-        raise Killed
-
-    monkeypatch.setattr(os, "fsync", power_cut)
-    with pytest.raises(Killed):
-        checkpoint.save(file, {"a": np.arange(4)})
-    assert file.read_bytes() == before
-    assert checkpoint.load(file)["a"].tolist() == [0, 1, 2]
 
 
 def test_damaged_or_foreign_checkpoint_is_refused(tmp_path):

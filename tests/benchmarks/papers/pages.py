@@ -1,7 +1,5 @@
 """Pages of the documentation, whose numbers the tests compute again."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

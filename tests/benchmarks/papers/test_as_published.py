@@ -1,7 +1,5 @@
 """Plants of the papers' figures: independent of the defaults of regulator and hysteresis."""
 
-from __future__ import annotations
-
 import pytest
 
 from benchmarks.papers.published import as_published

@@ -1,7 +1,5 @@
 """chakarov2018: figures of the elbow orthosis, known misses, and the documentation page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

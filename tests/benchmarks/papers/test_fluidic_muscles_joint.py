@@ -1,7 +1,5 @@
 """fluidic_muscles, sections 3 and 4: studies of the joint, their figures, and the page on them."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """fluidic_muscles, section 2: three paths, planned without and with the weight (2.1)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Inventory of the papers: each item has a row, each row an item; numbering and verdicts."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections import Counter

@@ -1,7 +1,5 @@
 """Picture of a stride: its section of the record and its annotations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

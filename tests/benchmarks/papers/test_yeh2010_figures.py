@@ -1,7 +1,5 @@
 """yeh2010: printed transfer functions, their loop, and tracking with the inverse."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 
 from benchmarks.board import leaderboard
-from benchmarks.runs import rows, verify
+from benchmarks.runs import rows
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, Report, run
 from benchmarks.runs.store import (
     comparable,
-    read_json,
     read_record,
     seal,
-    write_json,
     write_record,
 )
 from benchmarks.scenarios.scenario import ScenarioSet
@@ -90,28 +88,6 @@ def test_interrupted_write_leaves_the_old_file_and_is_swept(tmp_path, monkeypatc
 
 def interrupt(*_: object) -> None:
     raise KeyboardInterrupt
-
-
-def test_row_edited_by_hand_fails_its_checksum(track, folder):
-    (path,) = score(track, folder, "low").rows
-    row = read_json(path)
-    row["row"] = "better"
-    write_json(path, row)
-    with pytest.raises(ValueError, match="checksum"):
-        rows.load(path)
-    assert not verify.verify(path).holds
-
-
-def test_board_is_a_function_of_the_rows(track, folder):
-    score(track, folder)
-    files = leaderboard.files(rows.load_all(folder / "out"))
-    text = files["leaderboard/MusclePositioning.md"]
-    loaded = rows.load_all(folder / "out")
-    for row in loaded:
-        row["volatile"]["machine"] = "another"
-    again = leaderboard.files(loaded[::-1])
-    assert {name for name in files if again[name] != files[name]} == {"leaderboard/times.md"}
-    assert text.index("`integral`") < text.index("`middle`")
 
 
 def test_metrics_of_known_episodes():

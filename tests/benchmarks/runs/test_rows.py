@@ -158,7 +158,6 @@ def put(outer: str, key: str, value: object) -> Callable[[dict[str, Any]], None]
 DISAGREE = "have to agree, in letters, digits and _"
 REFUSED: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "path in the row's name": (put("", "row", "../../../escaped"), DISAGREE),
-    "path in the track's name": (put("scenarios", "name", "../../evil"), DISAGREE),
     "path in the controller's name": (put("controller", "name", "integral/.."), DISAGREE),
     "another file": (put("", "row", "tiny--inverse"), f"holds 'tiny--inverse'.*{DISAGREE}"),
     "former schema": (put("", "schema", 1), "schema 4, but of 1; run it again: .*--track tiny"),
@@ -176,14 +175,6 @@ def test_row_that_is_incomplete_or_misnamed_is_refused(what, classical, tmp_path
     write_record(path, row)
     with pytest.raises(ValueError, match=words):
         rows.load(path)
-
-
-def test_names_other_than_letters_digits_and_underscores_are_refused(classical, tmp_path):
-    row = copy.deepcopy(classical) | {"row": "a.b--c"}
-    row["scenarios"]["name"], row["controller"]["name"] = "a.b", "c"
-    write_record(rows.path_of("a.b--c", tmp_path), row)
-    with pytest.raises(ValueError, match=DISAGREE):
-        rows.load(rows.path_of("a.b--c", tmp_path))
 
 
 def test_row_of_an_unknown_track_is_refused(classical, tmp_path, monkeypatch):

@@ -5,8 +5,6 @@ less a bladder of exponential, neo-Hookean and saturating parts. Friction is a c
 that pressure drags, their breaks spread smoothly.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ A label is a kind of experiment and a letter of the instance: `random_b` is the 
 The load changes only in rests near 0 bar.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Catalogue of hidden effects, declared in `effects.toml`."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Hidden effect: name, drawn shape, and its entry in the constants of a rig."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Effects with more than named constants: functions that `effects.toml` names."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .effect import Shape, put

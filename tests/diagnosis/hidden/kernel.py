@@ -1,7 +1,5 @@
 """Integrator of the rig: linearly implicit midpoint rule with steps of 1 ms."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .kernel_air import fill

@@ -3,8 +3,6 @@
 In all kernels `p` is the record of constants and `s` that of the state; see `records` for units.
 """
 
-from __future__ import annotations
-
 import math
 
 from .kernel_tools import ATMOSPHERE, STEP, jit

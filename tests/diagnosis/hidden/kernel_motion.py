@@ -1,7 +1,5 @@
 """Kernels of motion: one step of load, creep and other moving parts."""
 
-from __future__ import annotations
-
 import math
 
 from .kernel_muscle import force

@@ -1,7 +1,5 @@
 """Kernels of friction, muscle force and hanging load."""
 
-from __future__ import annotations
-
 import math
 
 from .kernel_tools import GRAVITY, jit

@@ -1,7 +1,5 @@
 """Kernels of the position and pressure sensors."""
 
-from __future__ import annotations
-
 import math
 
 from .kernel_tools import PRESSURE_SPAN, STEP, jit, uniform

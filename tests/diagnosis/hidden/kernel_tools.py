@@ -1,7 +1,5 @@
 """Constants and functions common to the kernels."""
 
-from __future__ import annotations
-
 import math
 
 from numba import njit

@@ -4,8 +4,6 @@ Pressures are gauge pressures in bar, lengths are strains (contraction over rest
 name says mm, forces N, masses kg, times s. Every constant of an effect is neutral at zero.
 """
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

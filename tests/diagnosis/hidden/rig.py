@@ -1,7 +1,5 @@
 """Simulation of a rig under a campaign, and its recording."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

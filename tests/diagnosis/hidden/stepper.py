@@ -1,7 +1,5 @@
 """Rig driven by a controller, one command at a time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .base import CONTRACTION_NOISE_MM, PRESSURE_NOISE_BAR, Base

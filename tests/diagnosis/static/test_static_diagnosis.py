@@ -16,11 +16,9 @@ from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from tests.diagnosis.static.synthetic_readings import PRESSURES, table
 
 TABLE = load_contraction_table()
-COMPLIANCE, WIDTH, FRICTION = (
-    "load_dependent_compliance",
-    "load_dependent_hysteresis",
-    "pressure_dependent_friction",
-)
+COMPLIANCE = "load_dependent_compliance"
+WIDTH = "load_dependent_hysteresis"
+FRICTION = "pressure_dependent_friction"
 
 
 @pytest.fixture(scope="module")

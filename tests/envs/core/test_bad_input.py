@@ -1,7 +1,5 @@
 """Bad input raises a clear error and leaves the environment unchanged."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from pathlib import Path
@@ -102,6 +100,28 @@ def test_actions_out_of_range_are_clipped_and_reported(name: str) -> None:
     a, b = env.step(far), twin.step(edge)
     assert np.array_equal(a[0], b[0])
     assert (a[4]["saturated"], b[4]["saturated"]) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize("which", range(6))
+def test_one_of_several_actions_out_of_range_is_clipped_and_reported(which: int) -> None:
+    env, twin = (gym.make("PAM/RedundantManipulator-v0") for _ in range(2))
+    env.reset(seed=2)
+    twin.reset(seed=2)
+    action = np.zeros(6, np.float32)
+    action[which] = 1.0
+    edge = twin.step(action)
+    far = env.step(4.0 * action)
+    assert np.array_equal(edge[0], far[0])
+    assert (edge[4]["saturated"], far[4]["saturated"]) == (0.0, 1.0)
+
+
+def test_message_on_a_wrong_action_names_the_signals() -> None:
+    env = gym.make("PAM/AntagonisticJoint-v0", action="pressures").unwrapped
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="pressure_a_set_point, pressure_b_set_point"):
+        env.step(np.zeros(3))
+    with pytest.raises(ValueError, match=r"action\[1\] \(pressure_b_set_point\) is nan"):
+        env.step(np.array([0.0, np.nan]))
 
 
 @EVERY

@@ -1,7 +1,5 @@
 """Properties of every registered environment."""
 
-from __future__ import annotations
-
 import copy
 import importlib.util
 import itertools

@@ -1,7 +1,5 @@
 """Equal bits of one environment, rows of any batch, compiled and uncompiled."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Effects of a normal day: every environment draws them, within declared bounds."""
 
-from __future__ import annotations
-
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The lazily filled info behaves like a dict."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle

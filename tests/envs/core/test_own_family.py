@@ -1,7 +1,5 @@
 """Third-party family of environments: one folder and one scenario file."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 import os

@@ -1,7 +1,5 @@
 """Pages of the environments agree with the code in signals, info and arguments."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import inspect

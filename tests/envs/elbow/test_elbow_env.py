@@ -1,7 +1,5 @@
 """Elbow orthosis: references, reachable values, estimates, pulses."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym

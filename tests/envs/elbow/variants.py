@@ -1,7 +1,5 @@
 """Keyword arguments that reach the branches of the elbow orthosis."""
 
-from __future__ import annotations
-
 from typing import Any
 
 OWN: dict[str, dict[str, dict[str, Any]]] = {

@@ -1,7 +1,5 @@
 """Antagonistic joint: actions, disturbances, references, end."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Ending an episode at a limit has a lower return than continuing it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym

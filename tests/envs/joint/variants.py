@@ -1,7 +1,5 @@
 """Keyword arguments that reach the branches of the antagonistic joint."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint

@@ -1,7 +1,5 @@
 """Brace alone: tracked quantity, start, range of references."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym

@@ -1,7 +1,5 @@
 """Knee orthosis on a leg: references, assistance and effort follow from recorded signals."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium as gym

@@ -1,7 +1,5 @@
 """Keyword arguments that reach the branches of the knee orthosis."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis

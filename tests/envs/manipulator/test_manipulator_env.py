@@ -1,7 +1,5 @@
 """Redundant manipulator: path, plan, observation, output."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Keyword arguments that reach the branches of the redundant manipulator."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Keyword arguments that reach the branches of muscle positioning."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.plants.single_muscle.plant import SingleMuscle

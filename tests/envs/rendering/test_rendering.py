@@ -1,7 +1,5 @@
 """Pictures have the right size and content, and do not affect the simulation."""
 
-from __future__ import annotations
-
 import copy
 import os
 import subprocess

@@ -5,8 +5,6 @@ pressure [Pa]. Reward: ``-|contraction - reference| / 1 mm``. Start: at rest wit
 truncated after ``episode_seconds``; terminated when the contraction exceeds 30 mm.
 """
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import astuple, dataclass
 from typing import Any
@@ -68,7 +66,7 @@ class Muscle:
     family, control_period, substeps = "spring_muscle", 0.01, 1
 
     @property
-    def muscle(self) -> Muscle:
+    def muscle(self) -> "Muscle":
         """Component of the parameters' names."""
         return self
 
@@ -80,11 +78,11 @@ class Muscle:
         """Return the tables of hysteresis: there is none."""
         return np.zeros((1, 1, 1))
 
-    def members(self) -> tuple[Muscle, ...]:
+    def members(self) -> "tuple[Muscle, ...]":
         """Return the equally good fits: this one."""
         return (self,)
 
-    def replace(self, changes: dict[str, float]) -> Muscle:
+    def replace(self, changes: dict[str, float]) -> "Muscle":
         """Return a muscle with other parameters."""
         named = {name.partition(".")[2]: value for name, value in changes.items()}
         return Muscle(**{"lag": self.lag, "gain": self.gain, **named})

@@ -1,7 +1,5 @@
 """View of a muscle and a spring."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Array types of the diagnosis."""
+"""Array types."""
 
 import numpy as np
 from numpy.typing import NDArray
