@@ -3,14 +3,12 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.data.stick_slip import MUSCLE_LENGTH, load_stick_slip, log_slopes
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
-
-Array = NDArray[np.float64]
 
 CONTRACTION = 0.1
 """Contraction of both muscles at the middle: assumed, the record does not have it."""

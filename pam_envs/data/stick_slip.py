@@ -10,11 +10,9 @@ import dataclasses
 from importlib import resources
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.constants import ATMOSPHERE
-
-Array = NDArray[np.float64]
 
 FILE = "antagonistic_stick_slip.csv.gz"
 KPA, MM = 1e3, 1e-3

@@ -7,9 +7,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.statics import PairPlant
-from pam_envs.plants.core.linearise import Array, Branch, Equilibrium, local_branch
+from pam_envs.plants.core.linearise import Branch, Equilibrium, local_branch
 
 Inputs = Literal["pressure", "angle"]
 SIZE = 1e-5

@@ -21,8 +21,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
 from pam_envs.muscle.force_map import FULL_PRESSURE, ForceMap, paper_stretch
 from pam_envs.plants.antagonistic_joint import rows as K
@@ -33,7 +34,6 @@ from pam_envs.pneumatics.regulator import JointRegulator
 from pam_envs.sensing.sensor import GaugeSensor, JointEncoder
 
 Dynamics = Literal["muscles", "reduced"]
-Array = NDArray[np.float64]
 
 STRETCHED = (
     "assumed",

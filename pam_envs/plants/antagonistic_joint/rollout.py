@@ -7,8 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.pair import advance, feed_forward
@@ -39,8 +40,6 @@ OUTPUTS = signal_rows(
 MAKE = ("hysteresis.kind", "dynamics", "substeps")
 COMMANDED, STRESSED, DISTURBED, LOADED, FILLED_A, FILLED_B, DIRECT = range(7)
 """Input channels of a record; ``DIRECT`` above 0 means that pressures are given."""
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.mechanics.antagonistic_lever import SIDES, AntagonisticLever
 from pam_envs.muscle.force_map import ForceMap
 from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis
@@ -19,7 +20,6 @@ from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.plants.core.plant import Plant
 from pam_envs.pneumatics.regulator import JointRegulator
 
-Array = NDArray[np.float64]
 STEP = 1e-6
 SMALLEST_TORQUE = 1e-9
 SMALLEST_ARM = 1e-12

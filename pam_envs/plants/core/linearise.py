@@ -25,14 +25,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import HysteresisModel, operator_of
 
 if TYPE_CHECKING:
     from pam_envs.plants.core.plant import Plant
 
-Array = NDArray[np.float64]
 Branch = Literal["loading", "turned"]
 MISSING = "linearise needs python-control: pip install 'pam-envs[baselines]'"
 

@@ -15,12 +15,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from pam_envs.arrays import Array
 
 if TYPE_CHECKING:
     from pam_envs.plants.core.plant import Plant
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

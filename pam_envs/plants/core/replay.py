@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.core.rollout import BEGIN, call, drives_of, run
-
-Array = NDArray[np.float64]
 
 
 def drives_for(plant: Plant, channels: Mapping[str, ArrayLike]) -> Array:

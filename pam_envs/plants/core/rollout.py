@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import (
     COMPILED,
@@ -43,7 +44,6 @@ plant_drive: Any = None
 plant_begin: Any = None
 advance: Any = None
 
-Array = NDArray[np.float64]
 P = TypeVar("P")
 
 

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import LANES
 from pam_envs.plants.core.rollout import BEGIN, call, drives_of, in_tiles
 from pam_envs.plants.single_muscle import rows as R
@@ -23,8 +24,6 @@ PERIOD = 0.01
 LONGEST_PERIOD = 0.0101
 """Longest one [s]: it is one sub-step, whose errors stay below the noise of a good sensor."""
 READING, PRESSURE, POSITION = range(3)
-
-Array = NDArray[np.float64]
 
 
 class PlantBatch:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pam_envs.plants.core.linearise import Array, Branch, Equilibrium, local_branch
+from pam_envs.arrays import Array
+from pam_envs.plants.core.linearise import Branch, Equilibrium, local_branch
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 

@@ -21,8 +21,9 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.hysteresis.protocol import Usage
 from pam_envs.hysteresis.slip import SlipModel
@@ -42,7 +43,6 @@ from pam_envs.pneumatics.regulator import BundleRegulator
 from pam_envs.sensing.sensor import AngleSensor, GaugeSensor
 
 Valves = Literal["proportional", "on_off"]
-Array = NDArray[np.float64]
 
 MAKES: tuple[Valves, ...] = ("proportional", "on_off")
 STOP_GIVES = 0.15

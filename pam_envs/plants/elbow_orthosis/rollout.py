@@ -7,8 +7,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.plants.core.rollout import (
     Loop,
@@ -43,8 +44,6 @@ DRIVEN = (K.COMMAND_A, K.COMMAND_B, K.INTENT, K.INTENT_RATE, K.INTENT_ACCELERATI
 """Rows that drive a record, in the order of its channels."""
 START = len(DRIVEN)
 """First of the two channels with the pressures of the beginning."""
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.slip import SlipModel
-from pam_envs.plants.core.linearise import Array, Branch, Equilibrium, local_branch
+from pam_envs.plants.core.linearise import Branch, Equilibrium, local_branch
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.pneumatics.measured_dynamics import modes
 

@@ -24,6 +24,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import Usage, operator_of
 from pam_envs.hysteresis.slip import SlipModel
 from pam_envs.mechanics.knee_lever import KneeLever
@@ -48,7 +49,6 @@ from pam_envs.sensing.sensor import (
 from pam_envs.sensing.shoe import Shoe
 
 Mounting = Literal["rig", "no_load", "leg"]
-Array = NDArray[np.float64]
 Dynamics = Literal["lag", "measured"]
 Activity = Literal["walk", "stairs_up", "stairs_down"]
 

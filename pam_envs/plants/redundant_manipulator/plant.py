@@ -28,8 +28,9 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.muscle.force_map import ForceMap, paper_stretch
@@ -50,8 +51,6 @@ from pam_envs.plants.antagonistic_joint.statics import PairPlant
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.pneumatics.regulator import JointRegulator
 from pam_envs.sensing.sensor import GaugeSensor, JointEncoder
-
-Array = NDArray[np.float64]
 
 LINK = SerialChain.uniform()
 """The chain unless another one is given."""

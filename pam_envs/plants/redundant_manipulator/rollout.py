@@ -6,8 +6,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.mechanics.serial_chain.kernels import N_STAGES, parameter_rows
 from pam_envs.plants.antagonistic_joint.pair import advance, command
@@ -20,8 +21,6 @@ from pam_envs.plants.redundant_manipulator.step import begin_lane, replacements,
 JOINT_OUTPUTS = signal_rows(M, "angle velocity torque stiffness")
 MUSCLE_OUTPUTS = signal_rows(M, "pressure set_point force contraction lag")
 """Signals of a record (SI) and the first of their rows."""
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -13,8 +13,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.protocol import HysteresisModel
 from pam_envs.hysteresis.slip import SlipModel, slip_lag
@@ -24,7 +25,6 @@ from pam_envs.muscle.effective_area import EffectiveAreaMuscle, law_and_slope
 if TYPE_CHECKING:
     from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-Array = NDArray[np.float64]
 
 LOWEST, HIGHEST = -0.3, 0.6
 """Strains between which a rest is looked for."""

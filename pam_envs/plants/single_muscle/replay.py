@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.arrays import Array
 from pam_envs.plants.core.rollout import BEGIN, REZERO, drives_of, run
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -21,8 +22,6 @@ from pam_envs.plants.single_muscle.rollout import loop_of
 CHANNELS = ("contraction", "pressure")
 LONGEST_STEP = 0.0201
 """Longest sub-step [s] of a replay: errors of some micrometres, below the noise of a sensor."""
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
