@@ -1,7 +1,5 @@
 """Arithmetic without libm: the same bits on every processor, compiled or not."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel

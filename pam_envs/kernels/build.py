@@ -11,8 +11,6 @@ array whose last axis is the lane, so that the innermost loop over lanes vectori
 list of lists does the same work on Python floats.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar

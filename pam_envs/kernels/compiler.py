@@ -1,7 +1,5 @@
 """Machine code for kernels: numba, imported when the first kernel is built."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os

@@ -1,7 +1,5 @@
 """Ring of the last values of a signal, one a control period, in rows of the state."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.build import kernel

@@ -1,7 +1,5 @@
 """Exact steps of linear second-order motion: damped oscillator and resonator."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.arithmetic import TURN, decay

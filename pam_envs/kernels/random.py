@@ -1,7 +1,5 @@
 """Counter-based random numbers: a function of (seed, episode, stream, draw)."""
 
-from __future__ import annotations
-
 import math
 
 from pam_envs.kernels.arithmetic import log_of_fraction

@@ -1,7 +1,5 @@
 """Call graphs of kernels: copies with replaced global names, and digests for the cache."""
 
-from __future__ import annotations
-
 import hashlib
 import types
 from collections.abc import Callable, Mapping

@@ -9,8 +9,6 @@ The plant writes volume and rate of change of the volume of the present position
 ``gives``), and the predicted displacement to the middle (``ahead``).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY

@@ -8,8 +8,6 @@ its supply orifice fills the muscle, its exhaust orifice empties it. The flow of
 with absolute pressures, upstream first, at 20 degrees C: choked up to the critical ratio ``b``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar

@@ -10,8 +10,6 @@ so that a step at a held setpoint is exact for any duration, and every mode of a
 the setpoint itself.
 """
 
-from __future__ import annotations
-
 import cmath
 from dataclasses import KW_ONLY, dataclass
 

@@ -7,8 +7,6 @@ not at all. The flow of an open valve follows ISO 6358 (:mod:`pam_envs.pneumatic
 the bundle stays at 20 degrees C. A check valve keeps it out of the supply.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pam_envs.constants import ATMOSPHERE

@@ -6,8 +6,6 @@ Its effects are those of valve, supply and line: static gain, rounded slew limit
 valve that closes, overlap of a spool, slower and choked exhaust, leak.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar

@@ -4,8 +4,6 @@
 ``--write`` adds what is missing, ``--replace`` replaces the file.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sys

@@ -1,7 +1,5 @@
 """The antagonistic joint at rest: virtual work, symmetry, feedforward, reach, loops, files."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Static load check of the muscles against simulation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

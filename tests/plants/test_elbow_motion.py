@@ -1,7 +1,5 @@
 """The elbow orthosis in motion: independent integration, air, valves, wearer, convergence, bits."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

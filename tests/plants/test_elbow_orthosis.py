@@ -1,7 +1,5 @@
 """The elbow orthosis at rest: published torques, stiffness, allocation, hysteresis, files."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

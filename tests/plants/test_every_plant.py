@@ -1,7 +1,5 @@
 """Battery over every plant: files, rows, bits, batches, replay and single steps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

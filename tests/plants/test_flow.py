@@ -1,7 +1,5 @@
 """Flow of air through a regulator's orifices: balance of mass, filling, trapped air, refusals."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rollouts, replays and steps of every plant equal the committed hashes."""
 
-from __future__ import annotations
-
 import pytest
 
 from pam_envs.kernels.build import COMPILED

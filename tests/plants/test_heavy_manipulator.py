@@ -1,7 +1,5 @@
 """Masses that the arm's muscles bear, and the heavier arm of the page: its snippets and figures."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The antagonistic joint in motion: independent integration, poles, convergence, bits."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The orthosis in motion: against independent integrations, balances, published figures."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The knee orthosis at rest: published points, presets, files, bad values."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Linear models of plants against the plants themselves, and against known poles."""
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

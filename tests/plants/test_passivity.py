@@ -1,7 +1,5 @@
 """Closed cycles of pressure and position give out no energy with friction driven by length."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

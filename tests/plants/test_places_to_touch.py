@@ -1,7 +1,5 @@
 """A plant is added as one folder, an effect in the file of its component."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

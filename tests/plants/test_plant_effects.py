@@ -1,7 +1,5 @@
 """Effects of every plant: physical response, and neutral values that change nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The arm of six joints: statics, energy, convergence, bits, files."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

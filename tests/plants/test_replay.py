@@ -1,7 +1,5 @@
 """Replay of a recording: bits independent of the other lanes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

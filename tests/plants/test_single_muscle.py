@@ -1,7 +1,5 @@
 """The plant: static law, regulator, integrator, files."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Plants in one batch: compatibility and memory layout."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace as Plant
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Keyword arguments of environments: the common ones, their checks, and the two classes."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import inspect

@@ -1,7 +1,5 @@
 """Smooth equations of the antagonistic joint about a point of rest, for :meth:`Plant.linearise`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Literal
 

@@ -5,8 +5,6 @@ bearing of a single joint sticks and slips; each sensor has the effects of senso
 plant, which moves by its commands, only the pressures and the sensors have effects.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel

@@ -17,8 +17,6 @@ a sum of Maxwell-slip elements. The contraction is counted from that of the stra
 a virgin hysteresis is at rest.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any

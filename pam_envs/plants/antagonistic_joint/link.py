@@ -1,7 +1,5 @@
 """Link of a stage of antagonistic muscles, and its nominal point."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pam_envs.constants import GRAVITY

@@ -1,7 +1,5 @@
 """Kernels of a pair of muscles on the lever of one stage, the same alone and in a chain."""
 
-from __future__ import annotations
-
 import math
 from collections import namedtuple
 from typing import Any

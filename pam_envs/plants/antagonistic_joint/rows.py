@@ -4,8 +4,6 @@ Of pairs, the first row is muscle A's. ``AT``: contraction beyond that of the st
 (``STRAIGHT``), the hysteresis input.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from pam_envs.plants.core.muscle_path import DELAYED, PATH_STATE

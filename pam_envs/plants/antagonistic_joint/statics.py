@@ -3,8 +3,6 @@
 The static load check compares them with the weights at the angles of a plan.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

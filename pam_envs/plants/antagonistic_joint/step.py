@@ -11,8 +11,6 @@ The reduced plant of fluidic_muscles has in its place a hysteresis from command 
 and two real poles; disturbance and payload reach it through the stiffness of the nominal point.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.arithmetic import decay, sine_and_cosine

@@ -10,8 +10,6 @@ muscles of a plant share the parameters. A plain plant has dead time and regulat
 (:func:`follow_set_point`), an extended one all of the path (:func:`path_step`).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.hysteresis.friction_effects import (

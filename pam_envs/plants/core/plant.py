@@ -1,7 +1,5 @@
 """Base of all plants: named parameters in components, ensemble members, files, identity."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence

@@ -4,8 +4,6 @@ The module ``rollout`` beside a plant declares its inputs (``channels_of``), its
 (``readings_of``) and its loop (``loop_of``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -4,8 +4,6 @@ A family declares its loop once (:class:`Loop`): inputs, start, step and outputs
 the machine code for it and lays out the arrays.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter

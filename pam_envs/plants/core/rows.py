@@ -7,8 +7,6 @@ constant for each row, its name in capitals: ``PRESSURE`` of the state ``"pressu
 ``MUSCLE_AREA`` of the parameter ``"muscle.area"``.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any

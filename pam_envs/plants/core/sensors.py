@@ -4,8 +4,6 @@ The kernels of a plant call :func:`begin_sensors` at the beginning and :func:`re
 end of each control period; :func:`effect_kernels` gives their replacements.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

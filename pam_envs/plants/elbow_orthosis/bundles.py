@@ -6,8 +6,6 @@ a bundle contracts; ``settle`` writes pressures and air at its end. ``begin_peri
 pulses of the valves.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY

@@ -4,8 +4,6 @@ With proportional valves both bundles have all effects of their path; with on/of
 first cycles and temperature. The bearing sticks and slips, and the sensors have their effects.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel

@@ -22,8 +22,6 @@ represent this. Both models are assumed; the paper gives only the largest differ
 same for both.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Rollouts of the elbow orthosis, driven by given commands and motions of the wearer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any

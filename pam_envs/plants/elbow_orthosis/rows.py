@@ -6,8 +6,6 @@ friction driven by length, where each has an operator of its own); ``LEFT``, ``L
 ``OPENED``: coil time left, lift and state of each valve.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from pam_envs.hysteresis.protocol import NUMBERS

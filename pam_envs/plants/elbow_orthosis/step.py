@@ -8,8 +8,6 @@ stability limit. The hysteresis passes through the middles of the sub-steps, whe
 and the angle at the end of a period.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.hysteresis import protocol

@@ -1,7 +1,5 @@
 """Smooth equations of the knee orthosis about a point of rest, for :meth:`Plant.linearise`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -5,8 +5,6 @@ hysteresis turns the effective pressure into stiffness. The bearing of the brace
 sticks and slips, and all sensors have their effects.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.kernels.arithmetic import sine_and_cosine

@@ -1,7 +1,5 @@
 """Hysteresis of the orthosis' muscle, from pressure to stiffness."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import ClassVar

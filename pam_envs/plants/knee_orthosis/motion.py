@@ -9,8 +9,6 @@ muscle and the wearer's path going straight from their old to their new values: 
 no stability limit from a stiff spring.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE, GRAVITY

@@ -1,7 +1,5 @@
 """Rollouts of the knee orthosis, driven by given setpoints, parameter sets side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any

@@ -3,8 +3,6 @@
 Brace and muscle, then stride and wearer, then the modes of the measured dynamics.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from pam_envs.hysteresis.protocol import NUMBERS

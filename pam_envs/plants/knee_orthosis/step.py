@@ -6,8 +6,6 @@ The regulator is exact at the end of a sub-step, and the hysteresis then too, wh
 goes one way within a sub-step; the motion is of second order (see ``motion``).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.hysteresis import protocol

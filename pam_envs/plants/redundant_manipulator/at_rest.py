@@ -1,7 +1,5 @@
 """Smooth equations of the manipulator about a point of rest, for :meth:`Plant.linearise`."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """Rollouts of the redundant manipulator."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

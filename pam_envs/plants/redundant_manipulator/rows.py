@@ -8,8 +8,6 @@ velocity in a sub-step, ``SHARE`` the payload over the links' common factor; aft
 follow the damping of each joint beside ``link.damping`` [N m s/rad], and the chain's rows.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from pam_envs.hysteresis.protocol import NUMBERS

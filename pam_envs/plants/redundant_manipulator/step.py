@@ -13,8 +13,6 @@ A factor ``f`` of all links' masses multiplies M and bias, with the payload over
 ``f`` divides the other terms, and those of the chain do not depend on it.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.hysteresis import protocol

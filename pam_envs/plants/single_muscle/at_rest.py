@@ -1,7 +1,5 @@
 """Smooth equations of the single muscle about a point of rest, for :meth:`Plant.linearise`."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pam_envs.arrays import Array

@@ -12,8 +12,6 @@ A setpoint below zero means that the valve is shut: the muscle keeps its air exc
 with ``regulator.flow`` motion then compresses it.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.constants import GRAVITY

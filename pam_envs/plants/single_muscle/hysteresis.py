@@ -1,7 +1,5 @@
 """Hysteresis of the single muscle: friction driven by length, or of its effective pressure."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
 

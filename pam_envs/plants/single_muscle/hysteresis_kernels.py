@@ -1,7 +1,5 @@
 """Effective pressure or friction of the single muscle, around the kernels of a model."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

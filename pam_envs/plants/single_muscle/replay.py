@@ -5,8 +5,6 @@ may be shut, the muscle may restart, and the outputs are the readings of the sen
 beginning of each period.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Rollouts of the single muscle, driven by given setpoints, many parameter sets side by side."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from functools import partial

@@ -4,8 +4,6 @@
 length; ``HISTORY`` is the ring of the last setpoints.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from pam_envs.hysteresis import elements as plays

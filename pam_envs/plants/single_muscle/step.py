@@ -8,8 +8,6 @@ its new value. So the step is of second order and has no stability limit from th
 light load.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from pam_envs.constants import GRAVITY
