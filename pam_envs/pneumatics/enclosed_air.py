@@ -130,7 +130,7 @@ def flow_step(
         first = 1.0 - late[j] if older[j] >= 0.0 else 0.0
         last = late[j] if newer[j] >= 0.0 else 0.0
         goal, next_goal = gain[j] * older[j], gain[j] * newer[j]
-        source = min(upstream[j], reservoir[j] - drop[j])
+        source = min(upstream[j], reservoir[j]) - drop[j]
         fed = source + ATMOSPHERE
         fills, empties = supply[j], supply[j] * share[j]
         # pressures that the valve cannot pass
@@ -148,10 +148,13 @@ def flow_step(
         after = p + rate * inflow(opened, middle, fed, fills, empties, b, span)
         after = max(low, min(high, after))
         reached[j] = after if on[j] > 0.0 else p
-    if valve > 0:
+    if valve + count_on(fixed[effects + AIR.supply_droop], 0.0) > 0:
         for j in range(LANES):
             if on[j] > 0.0:
-                reached[j] = leaked(rows, fixed, j, state, effects, regulated[j], reached[j], h)
+                reached[j] = leaked(
+                    rows, fixed, j, state, effects, min(upstream[j], reservoir[j]), regulated[j],
+                    reached[j], h,
+                )  # fmt: skip
     for j in range(LANES):
         own[0][j] = regulated[j]
     for j in range(LANES):

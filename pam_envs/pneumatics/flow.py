@@ -21,15 +21,19 @@ AIRS = ("regulator", "flow")
 """Values of ``air=``: a closed-loop regulator, or the flow through its orifices."""
 SWITCH = "regulator.flow"
 """Parameter that selects one of ``AIRS``, 0 or 1."""
+REPLACED = (
+    *("slew_bend", "overlap", "exhaust_ratio", "exhaust_rate"),
+    *("overlap_leak", "exhaust_taper", "dead_close", "supply_time", "time_constant", "slew_rate"),
+)
+"""Parameters of a regulator that the orifices replace; the first four are effects that are off."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FlowEffects:
     """Orifices of a regulator and the air behind them.
 
-    With ``flow`` 1 they replace time constant, rate limit, overlap, the effects of the exhaust and
-    the supply's filling time. Dead time, gain, dead band, pressure and droop of the supply, leak
-    and line keep their effects.
+    With ``flow`` 1 they replace the parameters in ``REPLACED``. Dead time, gain, dead band,
+    pressure and droop of the supply, leak and line keep their effects.
     """
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
@@ -51,7 +55,7 @@ class FlowEffects:
         3.4e4, "Pa", 1e3, 5e5, "error that opens fully: lag of 50 ms times 6.8e5 Pa/s"
     )
     polytropic: float = assumed(
-        1.0, "1", 1.0, 1.4, "exponent of compression by motion; 1: isothermal, 1.4: adiabatic"
+        1.0, "1", 1.0, 1.4, "of compression by motion alone; 1: isothermal, 1.4: adiabatic"
     )
     source_pressure: float = assumed(7e5, "Pa", 5e4, 2e6, "gauge, upstream of the supply orifice")
 

@@ -212,6 +212,9 @@ class BundleRegulator(RegulatorEffects):
     )
     _: KW_ONLY
     conductance: float = usual_conductance(4.7e-9, "fills 0.24 l of seven muscles at 15 bar/s")
+    opening_band: float = assumed(
+        7.5e4, "Pa", 1e3, 5e5, "error that opens fully: lag of 50 ms times 1.5e6 Pa/s"
+    )
 
 
 AIR = parameter_rows(RegulatorEffects)
@@ -293,14 +296,17 @@ def lag_towards(
 
 @kernel
 def leaked(
-    rows: Any, fixed: Any, j: int, state: int, effects: int, pressure: float, reached: float,
-    h: float,
+    rows: Any, fixed: Any, j: int, state: int, effects: int, rest: float, pressure: float,
+    reached: float, h: float,
 ) -> float:  # fmt: skip
-    """Return the pressure [Pa] ``reached`` less its leak, and lower the supply by what it took."""
+    """Return the pressure [Pa] ``reached`` less its leak, and lower the supply by what it took.
+
+    ``rest`` is the pressure of the supply at rest [Pa].
+    """
     rows[state + AIR_STATE.drop][j] = supply_drop(
         rows[state + AIR_STATE.drop][j],
         reached - pressure,
-        fixed[effects + AIR.supply_pressure][j],
+        rest,
         fixed[effects + AIR.supply_droop][j],
         fixed[effects + AIR.supply_recovery][j],
         h,
@@ -349,7 +355,7 @@ def regulate_with_effects(
     rows[state + AIR_STATE.opened][j] = opened if stopped == reached else 0.0
     reached = stopped
     reached = pressure if target < 0.0 else reached
-    return leaked(rows, fixed, j, state, effects, pressure, reached, h)
+    return leaked(rows, fixed, j, state, effects, rest, pressure, reached, h)
 
 
 @kernel
@@ -368,7 +374,7 @@ def regulate_with_leak(
     reached = regulator_step(pressure, goal, lag, 1.0 / lag, slew, 1.0 / slew, h)
     reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
     reached = pressure if target < 0.0 else reached
-    return leaked(rows, fixed, j, state, effects, pressure, reached, h)
+    return leaked(rows, fixed, j, state, effects, rest, pressure, reached, h)
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rollout import loop_of, simulate
-from pam_envs.pneumatics.flow import SWITCH, inflow, mass_flow, power_of_ratio
+from pam_envs.pneumatics.flow import REPLACED, SWITCH, inflow, mass_flow, power_of_ratio
 from tests.envs.cases import IDS
 
 FLOW = {SWITCH: 1.0}
@@ -326,6 +327,51 @@ def test_variants_without_orifices_refuse_flow(plant: Any, remedy: str) -> None:
     with pytest.raises(ValueError, match="air = 'flow'") as refused:
         plant.replace(FLOW)
     assert remedy in str(refused.value)
+
+
+def test_air_compressed_beyond_the_setpoints_stiffens_the_knee() -> None:
+    leg = dataclasses.replace(KneeOrthosis.no_load("none").with_air("flow"), mounting="leg")
+    mounted = KneeOrthosis.on_leg().lever.mount_angle
+    plant = leg.replace({"lever.mount_angle": mounted, "stride.time": 1.3})
+    made, law = simulate_knee(plant, shut(4.4e5), compiled=False), plant.muscle
+    assert made["pressure"].max() > 1.3 * plant.regulator.max_pressure
+    slope = law.gain * law.stiffness_ratio * made["pressure"]
+    np.testing.assert_allclose(made["tension"], slope * (made["length"] - law.shortest_length))
+
+
+@pytest.mark.parametrize("name", REPLACED[:4])
+def test_effects_that_orifices_replace_are_refused(name: str) -> None:
+    plant = SingleMuscle.mas10()
+    value = 0.5 if plant.neutral[f"regulator.{name}"] == 0.0 else 2.0
+    with pytest.raises(ValueError, match=f"regulator.{name} = .* has no effect with air = 'flow'"):
+        plant.replace({f"regulator.{name}": value, **FLOW})
+
+
+def test_source_below_the_largest_setpoint_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"source_pressure = 500000 Pa must be above .* 600000 Pa"):
+        SingleMuscle.mas10().replace({"regulator.source_pressure": 5e5, **FLOW})
+
+
+def test_supply_droops_with_what_flows() -> None:
+    plant = SingleMuscle.mas10().with_air("flow")
+    fill = np.full(80, 6e5)
+    ample, poor = (
+        simulate(plant.replace({"regulator.supply_droop": droop}), fill)["pressure"]
+        for droop in (0.0, 0.5)
+    )
+    assert poor[-1] < ample[-1] - 5e4
+
+
+@pytest.mark.parametrize("randomize", [True, "everyday"])
+@pytest.mark.parametrize("name", IDS)
+def test_environment_draws_what_has_an_effect(name: str, randomize: Any) -> None:
+    for hysteresis, drive in product(("maxwell_slip", "preisach"), ("length", "pressure")):
+        chosen = {"hysteresis": hysteresis, "hysteresis_drive": drive, "randomize": randomize}
+        env = gym.make(name, air="flow", **chosen).unwrapped
+        assert env.setup.drawn and env.plant.air == "flow"
+    for air, other in (("flow", "time_constant"), ("regulator", "conductance")):
+        with pytest.raises(ValueError, match=f"regulator.{other}' has no effect on this plant"):
+            gym.make(name, air=air, randomize={f"regulator.{other}": (0.1, 0.2)})
 
 
 def test_switch_is_on_or_off() -> None:

@@ -19,12 +19,17 @@ from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.hysteresis.protocol import DRIVES, kind_of, kinds, model_of
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core.everyday import everyday
+from pam_envs.plants.core.plant import UnstableParameters
 from pam_envs.pneumatics.flow import AIRS, SWITCH
 from pam_envs.wording import near
 
 T = TypeVar("T")
 
 RENDER_MODES = (None, "rgb_array", "human")
+
+
+MOST_SUBSTEPS = 12
+"""Sub-steps up to which a plant with flow is refined for the parameters that it draws."""
 
 
 @dataclass(frozen=True)
@@ -198,11 +203,30 @@ class Common:
         check(task, "reward")
         return task  # type: ignore[no-any-return]
 
+    def drawn(self, plant: Any, which: Randomisation) -> tuple[Any, NDArray[np.float64]]:
+        """Return the plant and the ranges that every episode draws (:meth:`spread_of`).
+
+        Enclosed air stiffens a muscle: with ``air="flow"`` the plant has as many sub-steps as the
+        ranges need.
+        """
+        while True:
+            try:
+                return plant, self.spread_of(plant, which)
+            except UnstableParameters:
+                if plant.air != "flow" or plant.substeps >= MOST_SUBSTEPS:
+                    raise
+            plant = dataclasses.replace(plant, substeps=plant.substeps + 1)
+
     def spread_of(self, plant: Any, which: Randomisation) -> NDArray[np.float64]:
         """Return (row, low, high) of each parameter that every episode draws, checked."""
         names, ranges, table = list(which.parameters), self._ranges(plant, which), []
         allowed = [name for name in names if name not in (*which.fixed, SWITCH)]
         for name, span in ranges.items():
+            if name in plant.inert:
+                raise ValueError(
+                    f"randomize: {name!r} has no effect on this plant, with air = {plant.air!r}: "
+                    "leave it out"
+                )
             if name not in allowed:
                 raise ValueError(
                     f"randomize: {name!r} is not a parameter that can be drawn{near(name, allowed)}"
@@ -236,7 +260,7 @@ class Common:
         if isinstance(randomize, Mapping):
             return dict(randomize)
         if randomize == "everyday":
-            return dict(everyday(plant))
+            return {n: span for n, span in everyday(plant).items() if n not in plant.inert}
         if randomize is not True:
             raise ValueError(
                 f"randomize = {randomize!r} must be True, False, 'everyday' or a mapping from "
@@ -247,7 +271,7 @@ class Common:
         for name in which.parameters:
             component, _, attribute = name.partition(".")
             declared = declarations(getattr(plant, component))[attribute]
-            if declared.spread is not None and name not in which.fixed:
+            if declared.spread is not None and name not in (*which.fixed, *plant.inert):
                 ranges[name] = declared.spread
         return ranges
 

@@ -86,7 +86,7 @@ def compose(
     how many sines its evaluation sums, and ``view`` the import name of a
     :class:`~pam_envs.envs.rendering.scene.View`.
     """
-    spread = given.spread_of(plant, drawn)
+    plant, spread = given.drawn(plant, drawn)
     kernels = kernels_for(plant.needs_effects(spread))
     parts = [(part, 0.0) for part in observation]
     for name, *span in references:

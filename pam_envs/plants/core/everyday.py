@@ -40,7 +40,9 @@ EVERYDAY: dict[str, Range] = {
     "regulator.supply_droop": Range(0.01, 0.04, _SUPPLY),
     "regulator.supply_time": Range(0.2, 0.5, "0.73 to 1.07 s to 90 % of 6.3 bar, 20 mm muscle"),
     "regulator.dead_time": Range(0.04, 0.096, "40 ms inflating and 96 ms deflating, 10 mm muscle"),
-    "regulator.slew_rate": Range(4.9e5, 6.8e5, "6.8 bar/s, and 70 % of it for a slower valve"),
+    "regulator.slew_rate": Range(
+        4.9e5 / 6.8e5, 1.0, "6.8 bar/s, and 70 % of it for a slower valve", "regulator.slew_rate"
+    ),
     "regulator.exhaust_ratio": Range(1.0, 1.7, "lags of 84 against 50 ms, 10 mm muscle"),
 }
 """Ranges by parameter; of those that a plant has not it has no effect."""

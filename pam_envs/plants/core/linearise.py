@@ -112,6 +112,7 @@ def linearise(plant: Plant, **point: Any) -> Any:
         raise ValueError(
             "effects are on, and the linear model is that of the plain equations: linearise "
             "plant.replace(plant.neutral)"
+            + (" (which has air = 'regulator' in place of 'flow')" if plant.air == "flow" else "")
         )
     found: Equilibrium = plant.module("at_rest").at_rest(plant, **point)
     n = len(found.state)

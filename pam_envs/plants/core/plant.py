@@ -24,7 +24,7 @@ from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
 from pam_envs.plants.core.passivity import ImposedMuscles
-from pam_envs.pneumatics.flow import AIRS, SWITCH
+from pam_envs.pneumatics.flow import AIRS, REPLACED, SWITCH, FlowEffects
 from pam_envs.pneumatics.regulator import NO_SLEW_LIMIT
 from pam_envs.wording import near
 
@@ -177,6 +177,20 @@ class Plant:
             )
         if flow and self.flowless:
             raise ValueError(f"air = 'flow' ({SWITCH} = 1): {self.flowless}")
+        for name in (f"regulator.{r}" for r in REPLACED if flow):
+            if name in self.neutral and self.value(name) != self.neutral[name]:
+                raise ValueError(
+                    f"{name} = {self.value(name):g} has no effect with air = 'flow', whose "
+                    f"orifices replace it: leave it at {self.neutral[name]:g}, or take "
+                    "air = 'regulator'"
+                )
+        source, full = "regulator.source_pressure", "regulator.max_pressure"
+        if flow and self.value(source) <= self.value(full):
+            raise ValueError(
+                f"{source} = {self.value(source):g} Pa must be above {full} = "
+                f"{self.value(full):g} Pa, or the muscle is never filled: raise the source, or "
+                "lower the largest setpoint"
+            )
 
     def _usage(self) -> Usage:
         """Return the demands on the hysteresis operator."""
@@ -197,8 +211,8 @@ class Plant:
             enough = math.ceil(self.substeps * math.sqrt(phase / LARGEST_PHASE))
             raise UnstableParameters(
                 f"{motion} moves too fast for {self.substeps} sub-steps: phase {phase:.1f} against "
-                f"at most {LARGEST_PHASE:g}; use at least {enough} sub-steps or a larger "
-                "mass or inertia"
+                f"at most {LARGEST_PHASE:g}; use at least {enough} sub-steps "
+                f"(dataclasses.replace(plant, substeps={enough})) or a larger mass or inertia"
             )
 
     def replace(self, values: Mapping[str, Any]) -> Self:
@@ -256,6 +270,12 @@ class Plant:
     def flowless(self) -> str:
         """Reason why this variant has no flow through a regulator's orifices, and the remedy."""
         return ""
+
+    @property
+    def inert(self) -> frozenset[str]:
+        """Parameters of the regulator that have no effect with this air supply."""
+        names = REPLACED if self._flow else declarations(FlowEffects)
+        return frozenset(f"regulator.{name}" for name in names) - {SWITCH}
 
     def with_air(self, air: str) -> Self:
         """Return the plant with an air supply, ``"regulator"`` or ``"flow"``."""

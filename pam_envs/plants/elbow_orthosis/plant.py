@@ -96,6 +96,12 @@ class ElbowOrthosis(Plant, rows=K):
         own = "valves = 'on_off' have a flow of their own; leave regulator.flow at 0"
         return own if self.valves == "on_off" else ""
 
+    @property
+    def inert(self) -> frozenset[str]:
+        """Parameters of the regulator that have no effect: all, with on/off valves."""
+        own = (name for name in self.names if name.startswith("regulator."))
+        return frozenset(own) if self.valves == "on_off" else super().inert
+
     def with_air(self, air: str) -> Self:
         """Return the plant with an air supply; that of on/off valves is ``"flow"``."""
         if self.valves != "on_off":

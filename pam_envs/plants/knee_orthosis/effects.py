@@ -21,6 +21,7 @@ from pam_envs.plants.core.muscle_path import (
 from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.pneumatics.enclosed_air import AHEAD, REACHED, air_stiffness, enclose, flows_on
+from pam_envs.pneumatics.regulator import AIR
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 plain_regulate: Any = None  # placeholders: the dynamics of the pressure of the plain plant, and the
@@ -53,20 +54,44 @@ def squeeze_muscle(rows: Any, fixed: Any, share: float) -> None:
     """
     if flows_on(fixed, K.EFFECT.path) == 0:
         return
-    effective, stiffness, was = (
+    effective, beyond, stiffness, was = (
         rows[EFFECTS_AT + K.STATE.effective],
+        rows[EFFECTS_AT + K.STATE.beyond],
         rows[K.STIFFNESS],
         scratch(1, LANES),
     )
     for j in range(LANES):
+        effective[j] = effective[j] + beyond[j]
         was[0][j] = effective[j]
     path_squeeze(
         rows, fixed, EFFECTS_AT + K.STATE.path, K.EFFECT.path, rows[K.PRESSURE], effective, share
     )
     for j in range(LANES):
-        effective[j] = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective[j])
         gain = fixed[K.MUSCLE_GAIN][j] * fixed[K.MUSCLE_STIFFNESS_RATIO][j]
         stiffness[j] = stiffness[j] + gain * (effective[j] - was[0][j])
+        write_effective(rows, fixed, j, effective[j])
+
+
+@kernel
+def write_effective(rows: Any, fixed: Any, j: int, effective: float) -> None:
+    """Write the effective pressure [Pa] of lane ``j``, within the regulator's range.
+
+    Beyond it, where motion compresses the air, the hysteresis is continued by its slope
+    (:func:`stiffen_beyond`).
+    """
+    within = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective)
+    rows[EFFECTS_AT + K.STATE.effective][j] = within
+    flow = fixed[K.EFFECT.path + AIR.flow][j]
+    rows[EFFECTS_AT + K.STATE.beyond][j] = effective - within if flow > 0.0 else 0.0
+
+
+@kernel
+def stiffen_beyond(rows: Any, fixed: Any) -> None:
+    """Add the stiffness [N/m] of effective pressures beyond the regulator's range to a tile's."""
+    beyond = rows[EFFECTS_AT + K.STATE.beyond]
+    for j in range(LANES):
+        gain = fixed[K.MUSCLE_GAIN][j] * fixed[K.MUSCLE_STIFFNESS_RATIO][j]
+        rows[K.STIFFNESS][j] = rows[K.STIFFNESS][j] + gain * beyond[j]
 
 
 @kernel
@@ -79,8 +104,9 @@ def enclose_air(rows: Any, fixed: Any, j: int, angle: float, ahead: float) -> No
     arm, shortest = fixed[K.LEVER_ARM][j], fixed[K.MUSCLE_SHORTEST_LENGTH][j]
     ratio = fixed[K.MUSCLE_STIFFNESS_RATIO][j]
     length = muscle_length(sine, arm, fixed[K.LEVER_FITTINGS][j])
-    volume = gas_volume(length, shortest, ratio, fixed[K.MUSCLE_FULL_VOLUME][j])
-    gives = -ratio * stretch_of(length, shortest) * arm * cosine
+    stretch = stretch_of(length, shortest)  # a slack muscle folds and keeps its volume
+    volume = gas_volume(shortest + stretch, shortest, ratio, fixed[K.MUSCLE_FULL_VOLUME][j])
+    gives = -ratio * stretch * arm * cosine
     enclose(rows, j, EFFECTS_AT + K.STATE.path + PATH_STATE.air, volume, gives, ahead)
 
 
@@ -139,8 +165,7 @@ def advance_muscle(rows: Any, fixed: Any, h: float) -> None:
         factor,
     )
     for j in range(LANES):
-        effective = max(0.0, rows[K.PRESSURE][j] + own[0][j]) * factor[j]
-        rows[EFFECTS_AT + K.STATE.effective][j] = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective)
+        write_effective(rows, fixed, j, max(0.0, rows[K.PRESSURE][j] + own[0][j]) * factor[j])
 
 
 @kernel
@@ -150,6 +175,7 @@ def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
         rows, fixed, j, EFFECTS_AT + K.STATE.path, K.EFFECT.path, K.EFFECT.warm, rows[K.PRESSURE][j]
     )
     rows[EFFECTS_AT + K.STATE.effective][j] = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective)
+    rows[EFFECTS_AT + K.STATE.beyond][j] = 0.0
     rows[EFFECTS_AT + K.STATE.stuck][j] = 1.0
 
 
@@ -163,6 +189,7 @@ def muscle_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
         "plain_regulate": plain,
         "regulate": regulate_with_lag if dynamics == "lag" else regulate_as_measured,
         "begin_muscle": begin_muscle,
+        "stiffen_beyond": stiffen_beyond,
         "settle_air": settle_air,
         "begin_enclosed": begin_enclosed,
         "enclosed_stiffness": enclosed_stiffness,

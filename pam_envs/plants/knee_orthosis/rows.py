@@ -43,6 +43,7 @@ globals().update(
         path_effects("muscle", bearing="lever", sensors=SENSORS),
         {
             "effective": 1,
+            "beyond": 1,
             "path": PATH_STATE.end,
             "stuck": 1,
             "sensors": sensor_rows(len(SENSORS)),

@@ -130,6 +130,11 @@ def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def stiffen_beyond(rows: Any, fixed: Any) -> None:
+    """Add nothing: a plain plant's pressures stay within the regulator's range."""
+
+
+@kernel
 def settle_air(rows: Any, fixed: Any, h: float, work: Any) -> None:
     """Move the enclosed air of a tile with the motion: a plain plant has a regulator."""
 
@@ -199,6 +204,7 @@ def advance(
         for j in range(LANES):
             work[WAS][j] = rows[K.STIFFNESS][j]
         write_stiffness(rows, fixed, counts, table, hysteresis, 0, LANES, elements)
+        stiffen_beyond(rows, fixed)
         feel(rows, fixed, counts, table, hysteresis, elements, 0.5 * h, work)
         move(rows, fixed, counts, gait, i, substeps, h, work)
         settle_air(rows, fixed, h, work)
