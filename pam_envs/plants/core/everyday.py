@@ -1,7 +1,8 @@
 """Effects of a normal day: ranges of creep, leak, supply, regulators and drift, with sources.
 
 ``randomize="everyday"`` of an environment draws them in every episode. The ranges are those of
-recordings of Festo muscles and identified regulators, of several rigs each.
+recordings of Festo muscles and identified regulators, of several rigs each. The recordings are
+public but have no licence and no paper: only the figures that stand here are taken from them.
 """
 
 from __future__ import annotations
