@@ -15,7 +15,7 @@ from pam_envs.kernels import arithmetic, random
 from pam_envs.kernels import build as kernels
 from pam_envs.kernels.build import prange
 from pam_envs.kernels.motion import damped_motion, oscillator
-from pam_envs.kernels.rebind import rebind
+from pam_envs.kernels.rebind import Bound, rebind
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -160,7 +160,7 @@ def _both(x: float) -> float:
 def test_callees_are_built_once_for_each_binding() -> None:
     made: list[tuple[str, set[tuple[str, object]]]] = []
 
-    def finish(copy: Any, original: Any, bound: kernels.Bound) -> Any:
+    def finish(copy: Any, original: Any, bound: Bound) -> Any:
         made.append((original.__name__, set(bound)))
         return copy
 

@@ -32,6 +32,11 @@ MOST_SUBSTEPS = 12
 """Sub-steps up to which a plant with flow is refined for the parameters that it draws."""
 
 
+def inert_of(plant: Any) -> frozenset[str]:
+    """Return the parameters that have no effect on a plant, none of a plant of another package."""
+    return getattr(plant, "inert", frozenset())
+
+
 @dataclass(frozen=True)
 class Randomisation:
     """Parameters of a family that ``randomize`` may draw."""
@@ -213,16 +218,17 @@ class Common:
             try:
                 return plant, self.spread_of(plant, which)
             except UnstableParameters:
-                if plant.air != "flow" or plant.substeps >= MOST_SUBSTEPS:
+                if getattr(plant, "air", "") != "flow" or plant.substeps >= MOST_SUBSTEPS:
                     raise
             plant = dataclasses.replace(plant, substeps=plant.substeps + 1)
 
     def spread_of(self, plant: Any, which: Randomisation) -> NDArray[np.float64]:
         """Return (row, low, high) of each parameter that every episode draws, checked."""
         names, ranges, table = list(which.parameters), self._ranges(plant, which), []
+        inert = inert_of(plant)
         allowed = [name for name in names if name not in (*which.fixed, SWITCH)]
         for name, span in ranges.items():
-            if name in plant.inert:
+            if name in inert:
                 raise ValueError(
                     f"randomize: {name!r} has no effect on this plant, with air = {plant.air!r}: "
                     "leave it out"
@@ -260,18 +266,19 @@ class Common:
         if isinstance(randomize, Mapping):
             return dict(randomize)
         if randomize == "everyday":
-            return {n: span for n, span in everyday(plant).items() if n not in plant.inert}
+            inert = inert_of(plant)
+            return {n: span for n, span in everyday(plant).items() if n not in inert}
         if randomize is not True:
             raise ValueError(
                 f"randomize = {randomize!r} must be True, False, 'everyday' or a mapping from "
                 "parameter to "
                 f"(low, high), for example {which.example}"
             )
-        ranges = {}
+        ranges, inert = {}, inert_of(plant)
         for name in which.parameters:
             component, _, attribute = name.partition(".")
             declared = declarations(getattr(plant, component))[attribute]
-            if declared.spread is not None and name not in (*which.fixed, *plant.inert):
+            if declared.spread is not None and name not in (*which.fixed, *inert):
                 ranges[name] = declared.spread
         return ranges
 
