@@ -1,4 +1,4 @@
-"""Committed rows: in the last round of their track, of the present behaviour, a sample verified."""
+"""Committed rows: in the last round of their track, of the present behaviour, verified."""
 
 import pytest
 
@@ -16,12 +16,12 @@ CHEAP = {
 """A track of every family of plants, and controllers that are quickly designed."""
 
 
-def test_every_row_is_in_its_round_and_a_sample_is_verified():
+def test_every_row_is_in_its_round_and_verified():
     noted = verified.read(rows.RESULTS)
     found = rows.load_all()
     assert found
     assert [row["row"] for row in found if not audit.in_last_round(row)] == []
-    assert any(verified.of(row, noted) for row in found)
+    assert [row["row"] for row in found if not verified.of(row, noted)] == []
 
 
 @pytest.mark.parametrize("track", CHEAP)
