@@ -79,6 +79,7 @@ TRACKS = ("knee_walk_nominal", "knee_stairs_up_nominal", "knee_stairs_down_nomin
 def pareto_figure() -> Any:
     """Return RMS error against effort of the gaits' nominal tracks, the dominant rows joined."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
     figure = Figure(figsize=(10.5, 4.0), layout="constrained")
     for ax, track in zip(figure.subplots(1, 3), TRACKS, strict=True):
@@ -105,6 +106,9 @@ def pareto_figure() -> Any:
         ax.plot(*zip(*best, strict=True), color="C0", linewidth=0.8)
         ax.axhline(1.0, color="0.3", linewidth=0.8, linestyle=":")
         ax.set_xscale("log")
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.xaxis.set_major_formatter(ScalarFormatter())
+        ax.xaxis.set_minor_formatter(NullFormatter())
         ax.margins(x=0.2, y=0.1)
         ax.set_title(track.removeprefix("knee_").removesuffix("_nominal").replace("_", " "))
         ax.set_xlabel("RMS tracking error [N]")
