@@ -5,7 +5,8 @@
     regulator: {max_pressure_bar: 6}
     load: hanging_mass            # or constant_force
     sensors: {contraction_noise_mm: 0.03, pressure_noise_bar: 0.008}
-    history: {cycles_since_rest: 0, rezeroed: false}
+    history: {cycles_since_rest: 0, rezeroed: false, settled: true}
+    clock: {tolerance_ms: 0}      # largest offset between the clocks of command and readings
     repeats: [[holds_a, holds_b]] # segments that repeat one another
     valve_closed: [shut]          # segments during which the valve is shut
     tolerance: {mass.load: 0.02}  # relative tolerance of known parameters
@@ -45,13 +46,15 @@ NUMBERS = {
     "max_pressure": Bounds("regulator.max_pressure_bar", "bar", BAR, 0.5, 15.0),
     "contraction_noise": Bounds("sensors.contraction_noise_mm", "mm", MM, 1e-5, 10.0),
     "pressure_noise": Bounds("sensors.pressure_noise_bar", "bar", BAR, 1e-6, 1.0),
+    "clock_tolerance": Bounds("clock.tolerance_ms", "ms", 1e-3, 0.0, 1000.0),
 }
 """Fields of :class:`Rig` that are numbers with a unit."""
 SECTIONS: dict[str, tuple[str, ...]] = {
     "muscle": ("rest_length_mm", "diameter_mm"),
     "regulator": ("max_pressure_bar",),
     "sensors": ("contraction_noise_mm", "pressure_noise_bar"),
-    "history": ("cycles_since_rest", "rezeroed"),
+    "history": ("cycles_since_rest", "rezeroed", "settled"),
+    "clock": ("tolerance_ms",),
 }
 KEYS = ("plant", *SECTIONS, "load", "repeats", "valve_closed", "tolerance")
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -77,6 +80,11 @@ class Rig:
         Cycles that the muscle had made before the first row, since it last rested.
     rezeroed : bool
         Whether the position sensor was zeroed again at the start of each segment.
+    settled : bool
+        Whether the muscle was at rest, vented and settled at the first row and at every restart of
+        the clock.
+    clock_tolerance : float or None
+        Largest offset of the readings' clock from that of the command [s]; None if unknown.
     repeats : tuple of tuple of str
         Groups of segments with the same experiment.
     valve_closed : tuple of str
@@ -96,6 +104,8 @@ class Rig:
     pressure_noise: float | None = None
     cycles_since_rest: int = 0
     rezeroed: bool = False
+    settled: bool = False
+    clock_tolerance: float | None = None
     repeats: tuple[tuple[str, ...], ...] = ()
     valve_closed: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = dataclasses.field(default_factory=dict)
@@ -233,6 +243,7 @@ def _history(section: Mapping[str, Any]) -> dict[str, Any]:
     for key, kind, what in (
         ("cycles_since_rest", int, "a whole number"),
         ("rezeroed", bool, "true or false"),
+        ("settled", bool, "true or false"),
     ):
         good = key not in given or type(given[key]) is kind
         _require(good, f"history.{key} must be {what}, got {given.get(key)!r}")

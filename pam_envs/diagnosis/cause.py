@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from pam_envs.wording import near
 
 NEEDS = {
@@ -29,6 +31,7 @@ class Term:
     scale: float | None = None  # size of a meaningful change
     log: bool = False  # fitted on a logarithmic scale
     amount: bool = True  # whether the effect vanishes with it; other terms only shape the effect
+    prior: float = np.inf  # standard deviation about the start, in scales; e-folds if logarithmic
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,9 @@ class Cause:
     experiment: str = ""  # experiment that separates it from them
     source: str = ""  # source of the physics
     needs: tuple[str, ...] = ()  # words of NEEDS: requirements on a recording that can decide it
+    # whether rigs commonly differ in it from the base plant: it is part of the flexible base, and
+    # other causes are judged by what is left
+    common: bool = False
     once: bool = False  # it happens once, so that held-out kinds of segment need not show it
     sensor: str = ""  # sensor that would measure it directly
     contains: tuple[

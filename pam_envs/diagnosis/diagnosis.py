@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.arrays import Array
+from pam_envs.arrays import Array, Flags
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import audit
 from pam_envs.diagnosis.audit.noise import ChannelFloor, Floor, noise_floor
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.causes import selected
+from pam_envs.diagnosis.causes import by_name, selected
 from pam_envs.diagnosis.closed_loop import gain as loops
 from pam_envs.diagnosis.decide import isolability as iso
+from pam_envs.diagnosis.decide.flexible_base import FlexibleBase, shapes_of
 from pam_envs.diagnosis.decide.held_out import HeldOut, choose, compared, hold_out, interleaved
 from pam_envs.diagnosis.decide.isolability import not_testable
 from pam_envs.diagnosis.decide.rule import Rule
@@ -27,10 +28,16 @@ from pam_envs.diagnosis.experiment.experiment import propose, rival_of
 from pam_envs.diagnosis.experiment.plans import Means
 from pam_envs.diagnosis.fit import tolerance
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.calibrate import calibrate
+from pam_envs.diagnosis.fit.calibrate import Calibration, calibrate
 from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
-from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, identified, inputs_of, start_plant
+from pam_envs.diagnosis.fit.single_muscle import (
+    USUAL_ROWS,
+    MuscleFamily,
+    identified,
+    inputs_of,
+    start_plant,
+)
 from pam_envs.diagnosis.report.outcome import Diagnosis, Traces, steps
 from pam_envs.diagnosis.report.report import plain
 from pam_envs.diagnosis.report.summary import report_of
@@ -117,6 +124,7 @@ def diagnose(
         start = plant if plant is not None else start_plant(sheet)
         study = Study.begin(recording, sheet, start, floor)
         study.rule, study.seed = rule, seed
+        study.make_flexible(asked)
         step("isolability of causes")
         study.find_testable(asked)
         step("fitting rival causes")
@@ -152,6 +160,21 @@ def fit_failures_explained() -> Iterator[None]:
         raise ValueError(ADVICE) from error
 
 
+EXCHANGE = (0.06, 0.6)
+"""Seconds before and after a change of the load that are not compared: a recording does not tell how
+the load was exchanged."""
+
+
+def exchanges(recording: Recording) -> Flags:
+    """Return the samples about a change of the load, shape (T,)."""
+    n, period = len(recording.time), recording.period
+    found = np.zeros(n, bool)
+    for k in np.flatnonzero(np.diff(recording.load)) + 1:
+        before, after = (int(np.ceil(seconds / period)) for seconds in EXCHANGE)
+        found[max(0, k - before) : k + after] = True
+    return found
+
+
 def _noise(floor: ChannelFloor) -> float:
     """Return the noise that weights the residuals.
 
@@ -171,10 +194,10 @@ class Study:
     sheet: Rig
     start: SingleMuscle
     floor: Floor
-    family: MuscleFamily
-    problem: Problem
+    fitted: Calibration
     blocks: Blocks
     base: Candidate
+    normal: Candidate  # the base with the common differences that the recording needs
     regressors: Regressors
     rule: Rule = field(default_factory=Rule)
     seed: int = 0
@@ -192,7 +215,9 @@ class Study:
     @classmethod
     def begin(cls, recording: Recording, sheet: Rig, plant: SingleMuscle, floor: Floor) -> "Study":
         """Fit the base parameters of a plant to a recording."""
-        family = MuscleFamily(plant, inputs_of(recording, sheet))
+        known = sheet.clock_tolerance
+        clock = USUAL_ROWS * recording.period if known is None else known
+        family = MuscleFamily(plant, inputs_of(recording, sheet), clock)
         measured = np.full((len(family.channels), len(recording.time)), np.nan)
         noise = np.empty(len(family.channels))
         for k, (channel, fallback) in enumerate(
@@ -202,17 +227,21 @@ class Study:
             noise[k] = fallback
             if values is not None:
                 measured[k] = np.where(recording.filled, np.nan, values)
+                if channel == "contraction":
+                    measured[k][exchanges(recording)] = np.nan
                 noise[k] = max(_noise(floor[channel]), 1e-3 * fallback)
         ticks = np.asarray(np.arange(len(recording.time)) * recording.period, np.float64)
         blocks = Blocks.make(ticks, measured)
-        family, problem, base = calibrate(family, measured, noise, blocks, ticks)
+        shapes, rates = shapes_of(recording, sheet), by_name("slew_limit").forms
+        fitted = calibrate(family, measured, noise, blocks, ticks, shapes, rates)
+        problem, base = fitted.problem, fitted.base
         column = column_of(base.fit, base.fit.z)[None]
         problem.tie(column)
-        outputs = family.simulate(column)[:, :, 0]
+        outputs = fitted.family.simulate(column)[:, :, 0]
         regressors = Regressors.make(
             ticks, recording.command, outputs, recording.load, recording.temperature
         )
-        return cls(recording, sheet, plant, floor, family, problem, blocks, base, regressors)
+        return cls(recording, sheet, plant, floor, fitted, blocks, base, base, regressors)
 
     def floor_of(self, channel: str) -> tuple[float, str]:
         """Return the error [m], [Pa] of a perfect model, and its source."""
@@ -223,7 +252,7 @@ class Study:
     @property
     def model(self) -> Candidate:
         """The base with the causes of the decision."""
-        return self.base if self.decision is None else self.decision.model
+        return self.normal if self.decision is None else self.decision.model
 
     def plant_of(self, candidate: Candidate) -> SingleMuscle:
         """Return the plant of a candidate."""
@@ -245,12 +274,33 @@ class Study:
         """Return the simulated readings of a candidate, shape (channels, T)."""
         return self.family.simulate(self.column(candidate.fit)[None])[:, :, 0]
 
+    @property
+    def family(self) -> MuscleFamily:
+        """The plant with the inputs of the recording."""
+        return self.fitted.family
+
+    @property
+    def problem(self) -> Problem:
+        """Readings and simulation of the fits."""
+        return self.fitted.problem
+
+    @property
+    def flexible(self) -> FlexibleBase:
+        """Selection of the differences in which rigs commonly depart from the base."""
+        data = (self.problem, self.family, self.blocks, self.base, self.rule)
+        return FlexibleBase(*data, self.fitted.guess, self.fitted.rate)
+
+    def make_flexible(self, causes: Sequence[Cause]) -> None:
+        """Add the common differences that the recording needs to the base."""
+        self.normal = self.flexible.select(causes)
+
     def find_testable(self, causes: Sequence[Cause]) -> None:
         """Keep the causes that the recording can show."""
         self.isolability, self.not_testable = not_testable(
-            self.problem, self.family, self.base.fit, causes, self.recording, self.sheet
+            self.problem, self.family, self.normal.fit, causes, self.recording, self.sheet
         )
-        self.causes = [c for c in causes if c.name not in self.not_testable]
+        common = {cause.name for cause, _ in self.normal.causes}
+        self.causes = [c for c in causes if c.name not in {*self.not_testable, *common}]
 
     def recheck_loads(self) -> None:
         """Repeat the decision with loads refitted within their tolerance if they may explain it."""
@@ -263,9 +313,9 @@ class Study:
             tolerance.may_be_load(self.problem, self.blocks, m, loads, known) for m in models
         )
         if at_stake and np.isfinite(limit):
-            self.base = tolerance.refit_load(
-                self.problem, self.blocks, self.family, self.base, limit
-            )
+            data = (self.problem, self.blocks, self.family)
+            self.base = tolerance.refit_load(*data, self.base, limit)
+            self.normal = tolerance.refit_load(*data, self.normal, limit)
             self.causes = [c for c in self.causes if c.name != tolerance.PAYLOAD_ERROR]
             self.decide()
 
@@ -278,18 +328,20 @@ class Study:
         if self.short or iso.too_few_testable(
             len(self.causes), len(self.causes) + len(self.not_testable)
         ):
-            self.decision = Decision("insufficient", self.base)
+            self.decision = Decision("insufficient", self.normal)
             return
         self.decision = decide(
             self.problem,
             self.family,
             self.blocks,
-            self.base,
+            self.normal,
             self.causes,
             self.regressors,
             self.rule,
             self.seed,
         )
+        if self.decision.level and any(cause.common for cause, _ in self.model.causes):
+            self.decision.model = self.flexible.needed(self.decision.model)
 
     def hold_out(self) -> None:
         """Fit base, model and rivals without the held-out data."""
@@ -302,6 +354,7 @@ class Study:
             self.blocks,
             choice,
             self.base,
+            self.normal,
             self.model,
             [rival for rival, _ in judged(self.decision)],
             self.decision.open_rivals[:THOROUGH],
@@ -314,7 +367,7 @@ class Study:
         if decision is None or decision.verdict != "ambiguous" or not decision.open_rivals:
             return
         first, *others = (
-            rival_of(c.names, c.fit, len(self.base.fit.frees), self.problem.tie)
+            rival_of(c.names, c.fit, len(self.normal.fit.frees), self.problem.tie)
             for c in (decision.model, *decision.open_rivals)
         )
         measured = np.isfinite(self.problem.measured).any(axis=1)
@@ -389,7 +442,7 @@ class Study:
             r.load,
             r.temperature,
             split(self.problem.measured),
-            split(self.outputs(self.base)),
-            split(self.outputs(self.model)),
+            split(self.problem.shaped(self.outputs(self.base))),
+            split(self.problem.shaped(self.outputs(self.model))),
             {name: split(trace) for name, trace in effects.items()},
         )

@@ -15,25 +15,39 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebval2d
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
 from pam_envs.muscle.effects import (
+    MAP,
+    MAP_TERMS,
     LengthCreepEffects,
     LoadEffects,
+    StaticMapEffects,
     StrandEffects,
     TemperatureEffects,
     ViscosityEffects,
 )
 from pam_envs.parameters import assumed, effect, identified, published
 
+MAP_SIZES = MAP._fields[: len(MAP_TERMS)]
+"""Names of the sizes of a finer map."""
+NEWTON_STEPS, CLOSE, LEAST_GAIN = 40, 1e-6, 0.2
+"""Most steps of Newton's method for the pressure of a force, the last change [Pa], and the least
+slope over that without a map, which damps a step where the map is nearly flat."""
 _FIT = "least squares on positioning2021, Tables 3-5"
 
 
 @dataclass(frozen=True)
 class EffectiveAreaMuscle(
-    ViscosityEffects, StrandEffects, LengthCreepEffects, LoadEffects, TemperatureEffects
+    StaticMapEffects,
+    ViscosityEffects,
+    StrandEffects,
+    LengthCreepEffects,
+    LoadEffects,
+    TemperatureEffects,
 ):
     """Geometry and static force law of one muscle."""
 
@@ -46,8 +60,9 @@ class EffectiveAreaMuscle(
         ("load_stiffening",),
         ("load_stiffening_2",),
         ("load_stiffening_root",),
-        ("strand_1", "strand_2", "strand_3", "strand_4", "strand_break"),
+        ("strand_1", "strand_2", "strand_3", "strand_4", "strand_break", "strand_per_pressure"),
         ("viscosity", "viscosity_speed"),
+        MAP._fields,
     )
 
     rest_length: float = published(0.1, "m", 0.02, 2.0, "positioning2021, Table 1: MAS-10-N-100")
@@ -69,7 +84,27 @@ class EffectiveAreaMuscle(
     def tension(self, drive: ArrayLike, strain: ArrayLike) -> NDArray[np.float64]:
         """Return the force [N] at effective pressure ``drive`` [Pa] and ``strain`` [1]."""
         w, e = np.asarray(drive, float), np.asarray(strain, float)
-        return self.area_at(e) * w - self.passive(e)
+        force = self.area_at(e) * w - self.passive(e)
+        return force + self.mapped(w, e)[0] if self.finer else force
+
+    @property
+    def finer(self) -> bool:
+        """Whether the static law has a finer map."""
+        return any(getattr(self, name) != 0.0 for name in MAP_SIZES)
+
+    def mapped(
+        self, drive: ArrayLike, strain: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the force [N] of the finer map, and its derivative by pressure [m2]."""
+        sizes = np.zeros((6, 6))
+        for (p, e), name in zip(MAP_TERMS, MAP_SIZES, strict=True):
+            sizes[p, e] = getattr(self, name)
+        scaled = 2.0 * np.asarray(drive, float) / self.map_pressure - 1.0
+        u = np.clip(scaled, -1.0, 1.0)
+        s = np.clip(2.0 * np.asarray(strain, float) / self.map_strain - 1.0, -1.0, 1.0)
+        u, s, scaled = np.broadcast_arrays(u, s, scaled)
+        rising = chebval2d(u, s, chebder(sizes)) * (u == scaled) * 2.0 / self.map_pressure
+        return np.asarray(chebval2d(u, s, sizes)), np.asarray(rising)
 
     def area_at(self, strain: ArrayLike) -> NDArray[np.float64]:
         """Return the effective area [m2] at a strain."""
@@ -95,7 +130,15 @@ class EffectiveAreaMuscle(
     def drive(self, force: ArrayLike, strain: ArrayLike) -> NDArray[np.float64]:
         """Return the effective pressure [Pa] that gives ``force`` [N] at ``strain`` [1]."""
         e = np.asarray(strain, float)
-        return (np.asarray(force, float) + self.passive(e)) / self.area_at(e)
+        area, pull = self.area_at(e), np.asarray(force, float) + self.passive(e)
+        found = pull / area
+        for _ in range(NEWTON_STEPS if self.finer else 0):
+            more, gain = self.mapped(found, e)
+            step = (area * found + more - pull) / np.maximum(area + gain, LEAST_GAIN * area)
+            found = found - step
+            if np.all(abs(step) < CLOSE):
+                break
+        return found
 
 
 @kernel

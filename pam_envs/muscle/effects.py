@@ -1,4 +1,4 @@
-"""Effects of temperature, load, viscosity, creep of the length and friction of strands."""
+"""Effects of temperature, load, viscosity, creep of the length, strands and a finer static map."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from pam_envs.constants import ROOM_TEMPERATURE
 from pam_envs.kernels.arithmetic import count_on
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.parameters import assumed, effect
+from pam_envs.parameters import assumed, declarations, effect, named_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,35 +80,47 @@ class StrandEffects:
     strand_3: float = effect("N", 0.0, 500.0, "friction of the third strands to break away")
     strand_4: float = effect("N", 0.0, 500.0, "friction of the last strands to break away")
     strand_break: float = assumed(0.02, "1", 0.001, 0.3, "strain at which the last strand slips")
+    strand_per_pressure: float = assumed(
+        0.0, "1/Pa", -2e-6, 1e-4, "slip force gained over that at no pressure", neutral=0.0
+    )
+
+
+@kernel
+def slip_limit(fixed: Any, j: int, grows: int, drive: float) -> float:
+    """Return the factor on the slip force of strands at an effective pressure [Pa]."""
+    return max(0.0, 1.0 + fixed[grows][j] * drive)
 
 
 @kernel
 def strand_forces(
-    rows: Any, fixed: Any, state: int, force: int, break_away: int, strain: Any, friction: Any,
-    sticking: Any,
+    rows: Any, fixed: Any, state: int, force: int, break_away: int, strain: Any, drive: Any,
+    friction: Any, sticking: Any,
 ) -> None:  # fmt: skip
     """Add the strands' force [N] and its slope by strain [N] at strains of a tile.
 
     ``state``, ``force`` and ``break_away`` are the first rows of the slip positions and forces, and
-    the row of the strain at which the last strand breaks away.
+    the row of the strain at which the last strand breaks away; the next row is its growth with the
+    effective pressure ``drive`` [Pa].
     """
     for i in range(STRANDS):
         slip, part = rows[state + i], BREAKS[i]
         for j in range(LANES):
-            span = part * fixed[break_away][j]
-            stiff = fixed[force + i][j] / span
+            stiff = fixed[force + i][j] / (part * fixed[break_away][j])
+            span = part * fixed[break_away][j] * slip_limit(fixed, j, break_away + 1, drive[j])
             gap = max(-span, min(span, strain[j] - slip[j]))
             friction[j] = friction[j] + stiff * gap
             sticking[j] = sticking[j] + (stiff if abs(strain[j] - slip[j]) < span else 0.0)
 
 
 @kernel
-def slip_strands(rows: Any, fixed: Any, state: int, break_away: int, strain: Any) -> None:
+def slip_strands(
+    rows: Any, fixed: Any, state: int, break_away: int, strain: Any, drive: Any
+) -> None:
     """Move the strands' slip positions with the strains of a tile."""
     for i in range(STRANDS):
         slip, part = rows[state + i], BREAKS[i]
         for j in range(LANES):
-            span = part * fixed[break_away][j]
+            span = part * fixed[break_away][j] * slip_limit(fixed, j, break_away + 1, drive[j])
             slip[j] = max(strain[j] - span, min(strain[j] + span, slip[j]))
 
 
@@ -118,4 +130,91 @@ def strands_on(fixed: Any, force: int) -> int:
     on = 0
     for i in range(STRANDS):
         on = on + count_on(fixed[force + i], 0.0)
+    return on
+
+
+MAP_TERMS = (
+    (0, 5), (1, 3), (1, 4), (2, 0), (2, 1), (2, 2), (2, 3), (3, 0), (3, 1), (3, 2), (4, 0), (4, 1),
+    (5, 0),
+)  # fmt: skip
+"""Orders in pressure and in strain of the terms of a finer static map: those of total order five
+that the law of the muscle does not have."""
+_TERM = "N", -500.0, 500.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class StaticMapEffects:
+    """Correction of the static law by products of Chebyshev polynomials of pressure and strain.
+
+    The force of a term is ``map_ij T_i(2 w / map_pressure - 1) T_j(2 e / map_strain - 1)`` at an
+    effective pressure ``w`` and a strain ``e``; outside the range of the map it stays constant.
+    """
+
+    map_05: float = effect(*_TERM, "T_0(pressure) T_5(strain)")
+    map_13: float = effect(*_TERM, "T_1(pressure) T_3(strain)")
+    map_14: float = effect(*_TERM, "T_1(pressure) T_4(strain)")
+    map_20: float = effect(*_TERM, "T_2(pressure) T_0(strain)")
+    map_21: float = effect(*_TERM, "T_2(pressure) T_1(strain)")
+    map_22: float = effect(*_TERM, "T_2(pressure) T_2(strain)")
+    map_23: float = effect(*_TERM, "T_2(pressure) T_3(strain)")
+    map_30: float = effect(*_TERM, "T_3(pressure) T_0(strain)")
+    map_31: float = effect(*_TERM, "T_3(pressure) T_1(strain)")
+    map_32: float = effect(*_TERM, "T_3(pressure) T_2(strain)")
+    map_40: float = effect(*_TERM, "T_4(pressure) T_0(strain)")
+    map_41: float = effect(*_TERM, "T_4(pressure) T_1(strain)")
+    map_50: float = effect(*_TERM, "T_5(pressure) T_0(strain)")
+    map_pressure: float = assumed(6e5, "Pa", 1e4, 3e6, "upper end of the map")
+    map_strain: float = assumed(0.2, "1", 0.02, 0.6, "upper end of the map")
+
+
+MAP = named_rows(*declarations(StaticMapEffects))
+"""Rows of a finer static map, from its first."""
+
+
+@kernel
+def chebyshev(x: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the Chebyshev polynomials of order 0 to 5, and their derivatives.
+
+    They are constant beyond -1 and 1.
+    """
+    t = max(-1.0, min(1.0, x))
+    on = 1.0 if t == x else 0.0
+    t2, t4 = t * t, t * t * t * t
+    return (
+        (1.0, t, 2.0 * t2 - 1.0, (4.0 * t2 - 3.0) * t, 8.0 * (t4 - t2) + 1.0,
+         (16.0 * t4 - 20.0 * t2 + 5.0) * t),
+        (0.0, on, on * 4.0 * t, on * (12.0 * t2 - 3.0), on * (32.0 * t2 - 16.0) * t,
+         on * (80.0 * t4 - 60.0 * t2 + 5.0)),
+    )  # fmt: skip
+
+
+@kernel
+def map_force(
+    sizes: Any, j: int, first: int, drive: float, strain: float
+) -> tuple[float, float, float]:
+    """Return the force [N] of a finer static map at an effective pressure [Pa] and a strain.
+
+    Then minus its derivative by strain [N], and its derivative by pressure [m2]. ``sizes`` holds
+    the parameters of :class:`StaticMapEffects` in rows from ``first``, one lane a column.
+    """
+    per_pressure = 2.0 / sizes[first + MAP.map_pressure][j]
+    per_strain = 2.0 / sizes[first + MAP.map_strain][j]
+    of_pressure, by_pressure = chebyshev(drive * per_pressure - 1.0)
+    of_strain, by_strain = chebyshev(strain * per_strain - 1.0)
+    force, slope, gain = 0.0, 0.0, 0.0
+    for k in range(len(MAP_TERMS)):
+        p, e = MAP_TERMS[k]
+        size = sizes[first + k][j]
+        force = force + size * of_pressure[p] * of_strain[e]
+        slope = slope - size * of_pressure[p] * by_strain[e]
+        gain = gain + size * by_pressure[p] * of_strain[e]
+    return force, slope * per_strain, gain * per_pressure
+
+
+@kernel
+def map_on(fixed: Any, first: int) -> int:
+    """Return the number of lanes and terms of a tile with a finer static map."""
+    on = 0
+    for k in range(len(MAP_TERMS)):
+        on = on + count_on(fixed[first + k], 0.0)
     return on

@@ -125,6 +125,8 @@ class ValveEffects:
         UNCHOKED, "1/s", 0.05, UNCHOKED, "choked exhaust over absolute pressure", neutral=UNCHOKED
     )
     leak: float = effect("1/s", 0.0, 10.0, "pressure lost over pressure")
+    pilot_lag: float = effect("s", 0.0, 1.0, "one over the natural frequency of a pilot stage")
+    pilot_damping: float = assumed(1.0, "1", 0.1, 5.0, "damping ratio of the pilot stage")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,6 +141,7 @@ class RegulatorEffects(FlowEffects, LineEffects, SupplyEffects, ValveEffects):
         ("exhaust_ratio", "exhaust_taper"),
         ("exhaust_rate",),
         ("leak",),
+        ("pilot_lag", "pilot_damping"),
         ("supply_pressure", "supply_droop", "supply_time", "supply_recovery"),
         ("ring_share", "ring_flow", "ring_frequency", "ring_damping"),
         *FlowEffects.effects,
@@ -221,7 +224,7 @@ AIR = parameter_rows(RegulatorEffects)
 """Rows of the effects of valve, supply and line, from the first."""
 AIR_STATE = named_rows(
     *("regulated", "opened", "drop", "line", "line_rate"),
-    *("space", "here", "gives", "ahead", "slope"),
+    *("pilot", "pilot_rate", "space", "here", "gives", "ahead", "slope"),
 )
 """Rows of the state of valve, supply and line, from the first; then those of the air in the muscle:
 volume of its pressure [m3] (0 before the first sub-step), volume at the present position, change of
@@ -314,6 +317,33 @@ def leaked(
     return reached * decay(fixed[effects + AIR.leak][j] * h)  # type: ignore[no-any-return]
 
 
+SHORTEST_PILOT = 0.25
+"""Shortest lag of a pilot stage that a step follows, over the step."""
+
+
+@kernel
+def pilot_step(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, target: float, pressure: float,
+    h: float,
+) -> float:  # fmt: skip
+    """Return the setpoint [Pa] behind the pilot stage of lane ``j`` after ``h`` seconds.
+
+    A second-order lag; the setpoint itself without a pilot. While the valve is shut (a target below
+    zero) the pilot follows the ``pressure``.
+    """
+    lag = fixed[effects + AIR.pilot_lag][j]
+    if lag <= 0.0:
+        return target
+    if target < 0.0:
+        rows[state + AIR_STATE.pilot][j] = pressure
+        rows[state + AIR_STATE.pilot_rate][j] = 0.0
+        return target
+    turns = 1.0 / (TURN * max(lag, SHORTEST_PILOT * h, 1e-9))
+    ratio = fixed[effects + AIR.pilot_damping][j]
+    behind, _ = resonator_step(rows, j, state + AIR_STATE.pilot, target, target, turns, ratio, h)
+    return max(0.0, behind)
+
+
 @kernel
 def regulate_with_effects(
     rows: Any, fixed: Any, j: int, state: int, effects: int, lag: float, slew: float, full: float,
@@ -326,6 +356,7 @@ def regulate_with_effects(
     """
     pressure = rows[state + AIR_STATE.regulated][j]
     drop = rows[state + AIR_STATE.drop][j]
+    target = pilot_step(rows, fixed, j, state, effects, target, pressure, h)
     goal = fixed[effects + AIR.gain][j] * target
     wide = fixed[effects + AIR.dead_band][j]
     band = wide * fixed[effects + AIR.dead_close][j]
@@ -392,6 +423,7 @@ def regulate_with_gain(
 def begin_air(rows: Any, j: int, state: int, pressure: float) -> None:
     """Begin valve, supply and line of one lane at rest at a pressure [Pa]."""
     rows[state + AIR_STATE.regulated][j] = rows[state + AIR_STATE.line][j] = pressure
+    rows[state + AIR_STATE.pilot][j], rows[state + AIR_STATE.pilot_rate][j] = pressure, 0.0
     rows[state + AIR_STATE.opened][j] = rows[state + AIR_STATE.drop][j] = 0.0
     rows[state + AIR_STATE.line_rate][j] = rows[state + AIR_STATE.space][j] = 0.0
     rows[state + AIR_STATE.ahead][j] = rows[state + AIR_STATE.slope][j] = 0.0
@@ -405,6 +437,7 @@ def valve_effects_on(fixed: Any, effects: int) -> int:
         + count_on(fixed[effects + AIR.overlap], 0.0)
         + count_on(fixed[effects + AIR.exhaust_rate], UNCHOKED)
         + count_on(fixed[effects + AIR.slew_bend], 0.0)
+        + count_on(fixed[effects + AIR.pilot_lag], 0.0)
     )
     daily = (
         count_on(fixed[effects + AIR.exhaust_ratio], 1.0)

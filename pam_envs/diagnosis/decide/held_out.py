@@ -124,6 +124,7 @@ def hold_out(
     problem: Problem,
     blocks: Blocks,
     choice: Choice,
+    plain: Candidate,
     base: Candidate,
     model: Candidate,
     rivals: Sequence[Candidate],
@@ -132,15 +133,16 @@ def hold_out(
 ) -> HeldOut:
     """Fit all candidates to the training data.
 
-    The base starts from its fit to the decision's samples, all others from the new base with their
-    own parameters; model and close rivals also start from their previous fits, and the better fit
+    ``plain`` is the base without the differences that the recording needs. Both start from their
+    fits to the decision's samples, all others from the new base with their own parameters; model and close rivals also start from their previous fits, and the better fit
     to the training data counts. A rival with a cause that happens once cannot be judged on
     held-out kinds of experiment and is left to the interleaved blocks.
     """
     rows, again = choice.rows, replace(problem, train=~choice.rows)
     part = _held_blocks(problem, blocks, rows)
-    old = refit(again, blocks, base)
-    new = _thoroughly(again, blocks, old, model) if model.causes else old
+    first = refit(again, blocks, plain)
+    old = _thoroughly(again, blocks, first, base) if base.causes else first
+    new = old if model is base else _thoroughly(again, blocks, old, model)
     by_kind = choice.by == "kinds"
     found: list[Candidate | None] = [new if r is model else None for r in rivals]
     others = [
@@ -152,7 +154,7 @@ def hold_out(
     for k, candidate in zip(others, fitted, strict=True):
         thorough = any(rivals[k] is c for c in close)
         found[k] = _thoroughly(again, blocks, old, rivals[k]) if thorough else candidate
-    less = without_each_cause(again, blocks, old, new) if len(model.causes) > 1 else {}
+    less = without_each_cause(again, blocks, first, new) if len(model.causes) > 1 else {}
 
     def scored(candidate: Candidate) -> Candidate:
         left = np.where(rows, again.rows(candidate.fit.residual), 0.0)
@@ -163,7 +165,7 @@ def hold_out(
         again,
         part,
         seed,
-        scored(old),
+        scored(first),
         scored(new),
         [None if c is None else scored(c) for c in found],
         {name: scored(c) for name, c in less.items()},

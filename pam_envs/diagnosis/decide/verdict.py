@@ -41,6 +41,7 @@ class Decision:
     rivals: list[Candidate] = field(default_factory=list)  # best first
     open_rivals: list[Candidate] = field(default_factory=list)  # those that are not excluded
     evidence: dict[str, Any] = field(default_factory=dict)  # see Ladder.evidence
+    level: int = 0  # number of causes beside the differences of the base
 
 
 def remaining_structure(
@@ -240,7 +241,7 @@ def decide(
     selected = levels[judged.level]
     rivals = selected.rivals if judged.level else levels[min(1, len(levels) - 1)].rivals
     still = [rivals[k] for k in judged.open_rivals]
-    return Decision(judged.verdict, selected.model, rivals, still, evidence)
+    return Decision(judged.verdict, selected.model, rivals, still, evidence, judged.level)
 
 
 def effect_traces(problem: Problem, family: PlantFamily, model: Candidate) -> dict[str, Array]:

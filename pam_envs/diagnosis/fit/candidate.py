@@ -36,7 +36,9 @@ def frees_for(family: lsq.PlantFamily, form: Form, values: Sequence[float]) -> t
     for term, value in zip(form.terms, values, strict=True):
         given = {k: getattr(term, k) for k in ("low", "high", "scale")}
         changes = {k: v for k, v in given.items() if v is not None}
-        made.append(family.free(term.name, log=term.log, start=value, prior=np.inf, **changes))
+        made.append(
+            family.free(term.name, log=term.log, start=value, prior=term.prior, **changes)
+        )
     return tuple(made)
 
 
@@ -63,11 +65,11 @@ def initial_fits(
 ) -> list[lsq.Fit]:
     """Return the fits of a form at their starting points, with the base's Jacobian."""
     names = {f.name for f in base.frees}
-    if any(t.name in names for t in form.terms):
+    if not any(t.amount and t.name not in names for t in form.terms):
         return []
     fits = []
     for values in starting_points(problem, family, base, form):
-        frees = frees_for(family, form, values)
+        frees = tuple(f for f in frees_for(family, form, values) if f.name not in names)
         z = np.concatenate([base.z, [f.inner(f.start) for f in frees]])
         fits.append(
             lsq.Fit((*base.frees, *frees), z, base.column, shared=shared, label=(cause, form))
@@ -128,15 +130,25 @@ def restarted(fit: lsq.Fit, **changes: Any) -> lsq.Fit:
 
 
 def without_each_cause(
-    problem: lsq.Problem, blocks: Blocks, base: Candidate, model: Candidate
+    problem: lsq.Problem,
+    blocks: Blocks,
+    base: Candidate,
+    model: Candidate,
+    common_only: bool = False,
 ) -> dict[str, Candidate]:
-    """Return the model refitted without each of its causes, from the better of two starts."""
+    """Return the model refitted without each cause that the base lacks, the better of two starts.
+
+    ``common_only`` leaves out the causes in which rigs do not commonly differ.
+    """
     fits, labels = [], []
     for removed, form in model.causes:
+        if removed.name in base.names or (common_only and not removed.common):
+            continue
         dropped = {t.name for t in form.terms}
         kept = [k for k, f in enumerate(model.fit.frees) if f.name not in dropped]
         frees, z = tuple(model.fit.frees[k] for k in kept), model.fit.z[kept]
-        of_base = np.concatenate([base.fit.z, z[len(base.fit.z) :]])
+        known = dict(zip((f.name for f in base.fit.frees), base.fit.z, strict=True))
+        of_base = np.array([known.get(f.name, v) for f, v in zip(frees, z, strict=True)])
         for start in (z, of_base):
             fits.append(restarted(model.fit, frees=frees, z=start.copy(), shared=None))
             labels.append(removed.name)

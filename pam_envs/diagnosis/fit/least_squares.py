@@ -21,6 +21,8 @@ FEW_DAMPINGS = (1e-6, 1e-3, 0.3)
 LEAST_DAMPING = 1e-9  # regularisation of the normal equations
 STALLED = 1e3  # factor on all dampings after a round without improvement
 REACH_LOG, REACH = 1.0, 30.0  # longest steps in internal coordinates
+SHAPE_PRIOR = 300.0
+"""Standard deviation of the size of a shape, over the noise."""
 WORST = 1e4  # largest weighted residual, also of a diverged simulation
 
 
@@ -123,6 +125,9 @@ class Problem:
     train: Flags  # (T,): training samples
     time: Array  # (T,) [s]
     tie: Callable[[Array], None] = lambda columns: None  # completes columns in place
+    # (k, T): shapes that the readings of every channel may contain beside the plant's (zero offset,
+    # settling at the start); their sizes are solved for in every residual
+    shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @cached_property
     def order(self) -> Indices:
@@ -146,8 +151,34 @@ class Problem:
         if bad.any():
             outputs[bad] = WORST
             outputs[np.isnan(self.measured)] = 0.0
-        flat = outputs.transpose(2, 0, 1).reshape(len(columns), -1)
+        apart = outputs.transpose(2, 0, 1)
+        if len(self.shapes):
+            for k, (shapes, solver) in enumerate(self._solvers):
+                apart[:, k] -= (apart[:, k] @ solver.T) @ shapes
+        flat = apart.reshape(len(columns), -1)
         return np.take(flat, self.order, axis=1)
+
+    @cached_property
+    def _solvers(self) -> list[tuple[Array, Array]]:
+        """Shapes without missing readings, and the matrix that gives their sizes, by channel.
+
+        The sizes are those of the training samples, with a weak prior.
+        """
+        made = []
+        for readings in self.measured:
+            shapes = np.where(np.isfinite(readings), self.shapes, 0.0)
+            seen = shapes * self.train
+            normal = seen @ seen.T + SHAPE_PRIOR**-2 * np.eye(len(shapes))
+            made.append((shapes, np.linalg.solve(normal, seen)))
+        return made
+
+    def shaped(self, outputs: Array) -> Array:
+        """Return simulated outputs (channels, T) with the shapes that fit the readings best."""
+        if not len(self.shapes):
+            return outputs
+        left = np.nan_to_num((outputs - self.measured) / self.noise[:, None])
+        sizes = [solver @ row for (_, solver), row in zip(self._solvers, left, strict=True)]
+        return np.asarray(outputs - np.array(sizes) @ self.shapes * self.noise[:, None])
 
     def rows(self, residual: Array) -> Array:
         """Return a residual vector as an array of shape (channels, T)."""
@@ -200,12 +231,13 @@ def differentiate(problem: Problem, fits: Sequence[Fit]) -> None:
             z, step = shifted(fit, k)
             columns.append(column_of(fit, z))
             steps.append(step)
-    if not columns:
-        return
-    found = problem.residuals(np.array(columns))
+    found = problem.residuals(np.array(columns)) if columns else np.zeros((0, 0))
     at = 0
     for fit in fits:
         n = len(fit.frees) - fit.held
+        if n == 0:
+            fit.slopes = np.zeros((0, len(fit.residual)))
+            continue
         fit.slopes = (found[at : at + n] - fit.residual) / np.array(steps[at : at + n])[:, None]
         at += n
 

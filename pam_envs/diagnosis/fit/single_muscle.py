@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from pam_envs.plants.core.plant import UnstableParameters
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import CHANNELS, Inputs, replay_rows
+from pam_envs.pneumatics.flow import SWITCH
 
 THRESHOLDS = (3e3, 7e3, 1.2e4, 1.8e4, 2.5e4, 3.3e4, 4.2e4, 5.2e4, 6.3e4, 7.6e4, 9.1e4, 1.1e5)
 """Thresholds [Pa] of the base's play operators."""
@@ -33,9 +35,31 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "muscle.stiffening": {"scale": 1e4, "prior": 60.0},
     "mass.moving_mass": {"log": True, "prior": 0.7},
     "mass.damping": {"log": True, "prior": 1.0},
+    "regulator.conductance": {"log": True, "prior": 3.0},
+    "regulator.exhaust_share": {"log": True, "prior": 1.5},
+    "regulator.critical_ratio": {"scale": 0.1, "prior": 3.0},
+    "regulator.opening_band": {"log": True, "prior": 2.0},
+    "regulator.source_pressure": {"log": True, "prior": 0.5},
+    "regulator.pilot_lag": {"log": True, "low": 2e-3, "prior": 2.0},
+    "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
 }
 """Base parameters with the settings of their fits that differ from the declarations."""
-BASE = tuple(SETTINGS)
+ORIFICES = {
+    "regulator.conductance": 3e-10,
+    "regulator.exhaust_share": 1.0,
+    "regulator.critical_ratio": 0.3,
+    "regulator.opening_band": 4e4,
+    "regulator.source_pressure": 8e5,
+}
+"""Parameters of a regulator with flow through its orifices, with their starting values."""
+LAG = "regulator.time_constant"
+PILOT = {"regulator.pilot_lag": 0.02, "regulator.pilot_damping": 1.0}
+"""Starting values of the pilot stage of a regulator of second order."""
+BASE = tuple(name for name in SETTINGS if name not in PILOT and name not in ORIFICES)
+CLOCK = "clock.offset"
+"""Time [s] by which the readings lag the command: no parameter of the plant."""
+USUAL_ROWS = 2.0
+"""Sampling periods within which the clocks of command and readings agree, if not declared."""
 PLAIN_NEUTRAL = {
     "regulator.dead_time": 0.0,
     "regulator.slew_rate": 1e9,
@@ -61,6 +85,7 @@ class MuscleFamily:
 
     plant: SingleMuscle
     inputs: Inputs
+    clock: float = 0.0  # largest offset of the readings' clock [s]
 
     channels = CHANNELS
     fallback_noise = (5e-5, 1e3)
@@ -73,12 +98,31 @@ class MuscleFamily:
 
     @property
     def column(self) -> Array:
-        """Parameters of the plant, shape (p,)."""
-        return self.plant.parameter_rows()
+        """Parameters of the plant and the offset of the clock, shape (p + 1,)."""
+        return np.append(self.plant.parameter_rows(), 0.0)
+
+    @property
+    def lead(self) -> int:
+        """Number of samples by which the replay advances the command."""
+        return int(np.ceil(self.clock / self.inputs.period - 1e-9))
+
+    @cached_property
+    def _advanced(self) -> Inputs:
+        """Inputs with the command advanced within each run."""
+        if self.lead == 0:
+            return self.inputs
+        n = len(self.inputs.command)
+        ends = np.append(np.flatnonzero(self.inputs.fresh)[1:], n)
+        last = np.repeat(ends, np.diff(ends, prepend=0)) - 1
+        command = self.inputs.command[np.minimum(np.arange(n) + self.lead, last)]
+        return dataclasses.replace(self.inputs, command=command)
 
     def simulate(self, columns: Array) -> Array:
-        """Return sensor readings for parameter columns (n, p), shape (2, T, n)."""
-        return replay_rows(self.plant, columns, self.inputs)
+        """Return sensor readings for parameter columns (n, p + 1), shape (2, T, n)."""
+        given = columns[:, :-1].copy()
+        ahead = self.lead * self.inputs.period
+        given[:, R.REGULATOR_DEAD_TIME] += np.maximum(ahead + columns[:, -1], 0.0)
+        return replay_rows(self.plant, given, self._advanced)
 
     def tie(self, columns: Array) -> None:
         """Keep the total slope of the hysteresis at 1."""
@@ -97,6 +141,9 @@ class MuscleFamily:
             weight = dict(low=0.0, high=1.0, scale=0.02, prior=25.0)
             start = float(self.column[R.WEIGHT + k])
             return Free(name, R.WEIGHT + k, **{**weight, "start": start, **changes})
+        if name == CLOCK:
+            made = dict(low=-self.clock, high=self.clock, scale=0.01, start=0.0, prior=50 * self.clock)
+            return Free(name, len(self.column) - 1, **{**made, **changes})
         d, value = declared(self.plant, name), self.plant.value(name)
         made = dict(low=d.low, high=d.high, start=value)
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
@@ -104,11 +151,15 @@ class MuscleFamily:
 
     def base(self) -> tuple[Free, ...]:
         """Return the base parameters, with those of effects that the plant already has."""
-        names = [*BASE, *(f"hysteresis.weight[{k}]" for k in range(self.plant.elements))]
+        flows = self.plant.air == "flow"
+        names = [name for name in BASE if not (flows and name == LAG)]
+        names += [*(ORIFICES if flows else ()), *((CLOCK,) if self.clock > 0.0 else ())]
+        names += [name for name in PILOT if self.plant.regulator.pilot_lag > 0.0]
+        names += [f"hysteresis.weight[{k}]" for k in range(self.plant.elements)]
         present = [
             name
             for name, off in SWITCHED_OFF.items()
-            if name not in names and self.plant.value(name) != off
+            if name not in names and name != SWITCH and self.plant.value(name) != off
         ]
         return tuple(self.free(name) for name in (*names, *present))
 
@@ -132,6 +183,13 @@ class MuscleFamily:
 
 FINER = (6, 8, 12, 20, 40)
 """Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
+
+
+def unit_of(plant: SingleMuscle, name: str) -> str:
+    """Return the SI unit of a free parameter."""
+    if name == CLOCK:
+        return "s"
+    return "1" if name.startswith("hysteresis.weight") else declared(plant, name).unit
 
 
 def start_plant(rig: Any) -> SingleMuscle:

@@ -68,6 +68,6 @@ def refit_load(
     fit = restarted(
         base.fit, frees=(*base.fit.frees, free), z=np.append(base.fit.z, 0.0), shared=None
     )
-    found = refit(problem, blocks, Candidate((), fit, base.errors))
+    found = refit(problem, blocks, Candidate(base.causes, fit, base.errors))
     complete_jacobian(problem, found.fit)
     return found

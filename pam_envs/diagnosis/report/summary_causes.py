@@ -10,7 +10,7 @@ from pam_envs.diagnosis.decide.rule import Rule, not_excluded
 from pam_envs.diagnosis.decide.verdict import Decision, effect_traces
 from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.fit.intervals import spans
-from pam_envs.diagnosis.fit.single_muscle import declared
+from pam_envs.diagnosis.fit.single_muscle import declared, unit_of
 
 Json = dict[str, Any]
 
@@ -81,9 +81,7 @@ def calibration(study: Any) -> list[Json]:
     column = study.family.column
     for free in study.base.fit.frees:
         value, before = after[free.name], float(column[free.place])
-        unit = "1" if free.name.startswith("hysteresis.weight") else ""
-        if not unit:
-            unit = declared(study.family.plant, free.name).unit
+        unit = unit_of(study.family.plant, free.name)
         tolerance = study.sheet.tolerance.get(free.name)
         outside = tolerance is not None and abs(value - before) > tolerance * abs(before)
         made.append(
@@ -107,7 +105,7 @@ def judged(decision: Decision) -> list[tuple[Candidate, Mapping[str, Any]]]:
     levels = decision.evidence.get("levels", [])
     if len(levels) < 2:
         return []
-    rows = levels[max(len(decision.model.causes), 1)]["rivals"]
+    rows = levels[max(decision.level, 1)]["rivals"]
     by_name = {(tuple(r["names"]), tuple(r.get("forms", ()))): r for r in rows}
     found = [
         (c, by_name.get((c.names, tuple(f.name for _, f in c.causes)))) for c in decision.rivals
@@ -119,7 +117,7 @@ def reasons(decision: Decision, rule: Rule) -> list[str]:
     """Return the reason for which each judged rival is kept or excluded."""
     found = judged(decision)
     rows = [row for _, row in found]
-    if not decision.model.causes:
+    if not decision.level:
         return [LITTLE] * len(found)
     close = set(not_excluded(rows, rule)) if rows else set()
     still = {id(c) for c in decision.open_rivals}

@@ -29,6 +29,8 @@ from pam_envs.mechanics.guide import stick_slip_step
 from pam_envs.mechanics.hanging_mass import MOUNT_STATE, load_fraction, mount_step
 from pam_envs.muscle.effective_area import law_and_slope, volume
 from pam_envs.muscle.effects import (
+    map_force,
+    map_on,
     slip_strands,
     stiffening,
     strand_forces,
@@ -207,6 +209,14 @@ def law_of(
     )
 
 
+@kernel
+def pull_at_rest(fixed: Any, j: int, drive: float, e: float, stiffer: float) -> float:
+    """Return the force [N] of the static law and its map at an effective pressure [Pa]."""
+    pull, _ = law_of(fixed, j, drive, drive, e, stiffer)
+    more, _, _ = map_force(fixed, j, R.MUSCLE_MAP_05, drive, e)
+    return pull + more
+
+
 @routine
 def balance(fixed: Any, lane: int, drive: float, load: float, hangs: float) -> float:
     """Return the position [m] at rest of one lane, by bisection."""
@@ -215,7 +225,7 @@ def balance(fixed: Any, lane: int, drive: float, load: float, hangs: float) -> f
     low, high = -0.3, 0.6
     for _ in range(56):
         e = 0.5 * (low + high)
-        pull, _ = law_of(fixed, lane, drive - shift, drive - shift, e, stiffer)
+        pull = pull_at_rest(fixed, lane, drive - shift, e, stiffer)
         if pull > weight * load_fraction(e * length, hangs, fixed[R.MASS_SLACK][lane]):
             low = e
         else:
@@ -235,7 +245,7 @@ def excess_pull(rows: Any, fixed: Any, j: int, e: float) -> float:
     """Return the force [N] of one lane at a strain beyond what hangs of the load."""
     x, drive = e * fixed[R.MUSCLE_REST_LENGTH][j], rows[R.DRIVE][j]
     _, weight, stiffer, shift = carried(fixed, j, rows[R.LOAD][j])
-    pull, _ = law_of(fixed, j, drive - shift, drive - shift, e, stiffer)
+    pull = pull_at_rest(fixed, j, drive - shift, e, stiffer)
     hangs = load_fraction(x, rows[EFFECTS_AT + S.hangs][j], fixed[R.MASS_SLACK][j])
     return pull - weight * hangs
 
@@ -299,7 +309,9 @@ def seen_pressure(rows: Any, j: int) -> float:
 
 
 @kernel
-def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) -> None:
+def forces(
+    rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, maps: int
+) -> None:
     """Write the linearised motion of a tile, the effective pressure going from ``was``.
 
     Rows 3 to 7 of ``own``, per unit mass: stiffness, push at the predicted middle, jerk, damping,
@@ -316,7 +328,7 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
             strain[j] = (x[j] + 0.5 * h * v[j]) / fixed[R.MUSCLE_REST_LENGTH][j]
         strand_forces(
             rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_1, R.MUSCLE_STRAND_BREAK, strain,
-            friction, sticking,
+            drive, friction, sticking,
         )  # fmt: skip
     for j in range(LANES):
         per_length = 1.0 / fixed[R.MUSCLE_REST_LENGTH][j]
@@ -325,6 +337,12 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
         e = (x[j] + ahead) * per_length
         middle = 0.5 * (was[j] + drive[j]) - shift
         pull, slope = law_of(fixed, j, was[j] - shift, middle, e, stiffer)
+        taper = fixed[R.MUSCLE_AREA_TAPER][j] + fixed[R.MUSCLE_AREA_CURVE][j] * e
+        gain = fixed[R.MUSCLE_AREA][j] * (1.0 - taper * e)
+        if maps > 0:
+            more, _, _ = map_force(fixed, j, R.MUSCLE_MAP_05, was[j] - shift, e)
+            _, steeper, wider = map_force(fixed, j, R.MUSCLE_MAP_05, middle, e)
+            pull, slope, gain = pull + more, slope + steeper, gain + wider
         rub = fixed[R.HYSTERESIS_FRICTION][j]
         pull, slope = pull - friction[j], slope + sticking[j]
         pull, slope = pull - rub * rows[R.LAG][j], slope + rub * rows[R.STICK][j]
@@ -341,8 +359,7 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
         per_mass = 1.0 / max(moved, loss * h * FASTEST_DECAY, stiff * h * h * FASTEST_TURN)
         springs[j] = stiff * per_mass
         pushes[j] = (pull - weight * hangs) * per_mass
-        taper = fixed[R.MUSCLE_AREA_TAPER][j] + fixed[R.MUSCLE_AREA_CURVE][j] * e
-        jerks[j] = fixed[R.MUSCLE_AREA][j] * (1.0 - taper * e) * (drive[j] - was[j]) * per_mass / h
+        jerks[j] = gain * (drive[j] - was[j]) * per_mass / h
         drags[j] = per_mass * loss
         lightness[j] = per_mass
 
@@ -350,14 +367,14 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
 @kernel
 def move(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, was: Any,
-    h: float, own: Any, strands: int, sticks: int, mounts: int, stretches: int,
+    h: float, own: Any, strands: int, maps: int, sticks: int, mounts: int, stretches: int,
 ) -> None:  # fmt: skip
     """Move the load of a tile for ``h`` seconds, the effective pressure going from ``was``."""
     x, v, stuck = rows[R.CONTRACTION], rows[R.VELOCITY], rows[EFFECTS_AT + S.stuck]
     before, width = own[0], own[1]
     springs, pushes, jerks, drags, lightness = own[3], own[4], own[5], own[6], own[7]
     hysteresis_ahead(rows, fixed, counts, table, hysteresis, 0, LANES, elements, 0.5 * h)
-    forces(rows, fixed, was, h, own, strands)
+    forces(rows, fixed, was, h, own, strands, maps)
     if sticks > 0:
         for j in range(LANES):
             dx, v[j], stuck[j] = stick_slip_step(
@@ -376,7 +393,7 @@ def move(
     if strands > 0:
         for j in range(LANES):
             width[j] = x[j] / fixed[R.MUSCLE_REST_LENGTH][j]
-        slip_strands(rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_BREAK, width)
+        slip_strands(rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_BREAK, width, rows[R.DRIVE])
     shown = rows[EFFECTS_AT + S.shown]
     for j in range(LANES):
         before[j] = shown[j]
@@ -423,6 +440,7 @@ def advance_extended(
         + count_on(fixed[R.MUSCLE_TEMPERATURE_GAIN], 0.0)
     )
     strands, sticks = strands_on(fixed, R.MUSCLE_STRAND_1), count_on(fixed[R.MASS_STICK], 0.0)
+    maps = map_on(fixed, R.MUSCLE_MAP_05)
     fine = sticks + count_on(fixed[R.MUSCLE_VISCOSITY], 0.0)
     parts = FINE_PARTS if fine > 0 else 1
     for j in range(LANES):
@@ -483,7 +501,7 @@ def advance_extended(
                 drive[j] = was[j] + (end[j] - was[j]) / (parts - q)
             move(
                 rows, fixed, counts, table, hysteresis, elements, was, h / parts, own, strands,
-                sticks, mounts, stretches,
+                maps, sticks, mounts, stretches,
             )  # fmt: skip
             if flows > 0:
                 for j in range(LANES):

@@ -21,6 +21,7 @@ from pam_envs.hysteresis.protocol import HysteresisModel
 from pam_envs.hysteresis.slip import SlipModel, slip_lag
 from pam_envs.kernels.build import entry, kernel
 from pam_envs.muscle.effective_area import EffectiveAreaMuscle, law_and_slope
+from pam_envs.muscle.effects import MAP, map_force
 
 if TYPE_CHECKING:
     from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -50,9 +51,11 @@ def strain_of_rest(
     below, above, e, last = LOWEST, HIGHEST, 0.05, 1.0
     for _ in range(MOST_STEPS):
         force, slope = law_and_slope(
-            drive, drive, e, stiffer, law[0], law[1], law[2], law[3], law[4], law[5], law[6],
-            law[7], law[8],
+            drive, drive, e, stiffer, law[0, 0], law[1, 0], law[2, 0], law[3, 0], law[4, 0],
+            law[5, 0], law[6, 0], law[7, 0], law[8, 0],
         )  # fmt: skip
+        more, steeper, _ = map_force(law, 0, 9, drive, e)
+        force, slope = force + more, slope + steeper
         lag, stick = slip_lag(e, limit, thresholds, curves, low, per, sliders)
         excess = force - friction * lag - pull
         if excess > 0.0:
@@ -84,13 +87,14 @@ def rest_rows(
 
 
 def _numbers(law: EffectiveAreaMuscle) -> Array:
-    """Return the parameters of the static law as :func:`strain_of_rest` reads them."""
+    """Return the parameters of the static law as :func:`strain_of_rest` reads them, a column."""
     return np.array(
         [
             *(law.area, law.area_taper, law.braid_force, law.braid_strain, law.stiffness),
             *(law.hardening, law.area_curve, law.softening, law.stiffening),
+            *(getattr(law, name) for name in MAP._fields),
         ]
-    )
+    )[:, None]
 
 
 def strains_of_rest(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.arrays import Array
+from pam_envs.muscle.effective_area import MAP_SIZES
 from pam_envs.plants.core.rollout import BEGIN, REZERO, drives_of, run
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -78,6 +79,7 @@ COSTLY = (
         "regulator.exhaust_rate",
         "regulator.leak",
         "regulator.supply_pressure",
+        "regulator.pilot_lag",
     ),
     (
         "hysteresis.shape",
@@ -92,6 +94,7 @@ COSTLY = (
     tuple(f"muscle.creep_{k}" for k in (1, 2, 3, 4)),
     tuple(f"hysteresis.creep_{k}" for k in (1, 2, 3, 4)),
     tuple(f"muscle.strand_{k}" for k in (1, 2, 3, 4)),
+    tuple(f"muscle.{name}" for name in MAP_SIZES),
     ("mass.stick", "muscle.viscosity"),
 )
 """Parameters of the effects that a tile works out only where one of them is on."""

@@ -19,6 +19,7 @@ from pam_envs.mechanics.hanging_mass import MOUNT_STATE, MountEffects, SupportEf
 from pam_envs.muscle.effects import (
     LengthCreepEffects,
     LoadEffects,
+    StaticMapEffects,
     StrandEffects,
     TemperatureEffects,
     ViscosityEffects,
@@ -35,6 +36,7 @@ _EFFECTS: dict[str, tuple[Any, ...]] = {
     "muscle": (
         *("area_curve", "softening", "stiffening"),
         *(TemperatureEffects, LoadEffects, LengthCreepEffects, StrandEffects, ViscosityEffects),
+        StaticMapEffects,
     ),
     "mass": ("carried", "load_error", SupportEffects, GuideEffects, MountEffects),
     "position": SENSOR._fields,

@@ -15,7 +15,8 @@ CAUSE = Cause(
             "strands",
             (
                 *(Term(f"muscle.strand_{k}", (0.5, 2.0), scale=1.0) for k in (1, 2, 3, 4)),
-                Term("muscle.strand_break", (0.02,), log=True, amount=False),
+                Term("muscle.strand_break", (0.02,), log=True, amount=False, prior=1.5),
+                Term("muscle.strand_per_pressure", (0.0,), scale=1e-6, amount=False, prior=8.0),
             ),
         ),
     ),
@@ -43,4 +44,5 @@ CAUSE = Cause(
     settled="whole cycles do not separate length-driven from pressure-driven friction",
     sensor="a load cell at a blocked length",
     compensable=True,
+    common=True,
 )

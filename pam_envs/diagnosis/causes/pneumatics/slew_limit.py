@@ -1,7 +1,8 @@
 """Slew limit: the flow of the valve limits the rate of the pressure.
 
 A fully open valve passes a limited flow, so that large steps follow a straight ramp before they
-round off. Small steps do not reach the limit and follow the lag alone.
+round off. Small steps do not reach the limit and follow the lag alone. The flow through the orifices of
+supply and exhaust limits the rate to one that depends on the pressure.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
@@ -17,6 +18,14 @@ CAUSE = Cause(
                 Term("regulator.slew_bend", (0.5,), scale=0.5, amount=False),
             ),
         ),
+        Form(
+            "orifices",
+            (
+                Term("regulator.supply_pressure", (7e5,), low=5e5, high=1.5e6, log=True),
+                Term("regulator.supply_time", (0.1, 0.4), log=True, amount=False),
+                Term("regulator.exhaust_rate", (8.0, 3.0), low=0.2, high=99.0, log=True),
+            ),
+        ),
     ),
     signature="a triangle after each large step: the time to 63 % grows with the size of the step",
     neighbours=("dead_time", "supply_droop", "exhaust_asymmetry"),
@@ -28,4 +37,5 @@ CAUSE = Cause(
     source="A public record of a DMSP-10-250: 6.8 bar/s in a raw step; ISO 6358 for the flow.",
     sensor="a fast pressure sensor at the muscle",
     compensable=True,
+    common=True,
 )

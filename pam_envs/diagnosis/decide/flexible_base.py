@@ -1,0 +1,150 @@
+"""Flexible base: the differences in which rigs commonly depart from the base plant.
+
+Readings of a real rig differ from every model in the shape of the force law, in what drives the
+friction and in the order and rate of the regulator. A cause is judged by what is left when these
+have been fitted (kennedy2001). A difference that the recording does not need is dropped again.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from pam_envs.arrays import Array
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis.cause import Cause, Form
+from pam_envs.diagnosis.decide import compare
+from pam_envs.diagnosis.decide.rule import Rule
+from pam_envs.diagnosis.fit import least_squares as lsq
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.candidate import (
+    Candidate,
+    complete_jacobian,
+    frees_for,
+    refit,
+    restarted,
+    without_each_cause,
+)
+
+SETTLING = (0.5, 2.0, 6.0)
+"""Time constants [s] of the settling after a start that was not at rest."""
+MOST_STARTS = 6
+"""Largest number of restarts that have their own settling."""
+ROUNDS = 10
+STARTS = 2
+"""Number of starting values of each difference."""
+
+
+def shapes_of(recording: Recording, sheet: Rig) -> Array:
+    """Return the shapes that readings may contain beside the plant's, (k, T).
+
+    A zero offset, one for each run of a sensor that was zeroed again, and the settling after each
+    start, unless the rig declares that it began at rest.
+    """
+    n, period = len(recording.time), recording.period
+    starts = np.flatnonzero(recording.restart)
+    ends = np.append(starts[1:], n)
+    runs = [slice(a, b) for a, b in zip(starts, ends, strict=True)]
+    made = [np.ones(n)]
+    if sheet.rezeroed:
+        made = [(recording.segment == k).astype(float) for k in range(len(recording.segments))]
+    if not sheet.settled:
+        for run, tau in product(runs[:MOST_STARTS], SETTLING):
+            shape = np.zeros(n)
+            shape[run] = np.exp(-period * np.arange(run.stop - run.start) / tau)
+            made.append(shape)
+    return np.array(made)
+
+
+@dataclass(frozen=True)
+class FlexibleBase:
+    """Selection of the common differences on a fitted base."""
+
+    problem: lsq.Problem
+    family: lsq.PlantFamily
+    blocks: Blocks
+    base: Candidate
+    rule: Rule
+    guess: Mapping[str, float] = field(default_factory=dict)  # starting values by parameter
+    rate: Form | None = None  # form of the limited rate that the pressure needs
+
+    def chosen(self, causes: Sequence[Cause]) -> list[tuple[Cause, Form]]:
+        """Return the common differences that the base lacks, each in one form.
+
+        A limited rate is among them where the pressure alone has shown it.
+        """
+        known = {f.name for f in self.base.fit.frees}
+        made = []
+        for cause in causes:
+            form = cause.forms[0]
+            if any(self.rate is f for f in cause.forms):
+                form = self.rate
+            elif cause.in_valve:
+                continue
+            if not any(t.name in known for t in form.terms):
+                made.append((cause, form))
+        return made
+
+    def fitted(self, causes: Sequence[tuple[Cause, Form]]) -> Candidate:
+        """Return the base extended by some causes at once, from the best of several starts."""
+        fits, plain = [], self.base.fit
+        begins = [plain.z]
+        if self.guess:
+            begins.append(np.array([inside(f, self.guess.get(f.name, f.start)) for f in plain.frees]))
+        for (_, begin), k in product(enumerate(begins), range(STARTS)):
+            frees = tuple(
+                free
+                for _, form in causes
+                for free in frees_for(
+                    self.family,
+                    form,
+                    [self.guess.get(t.name, t.starts[min(k, len(t.starts) - 1)]) for t in form.terms],
+                )
+            )
+            z = np.concatenate([begin, [inside(f, f.start) for f in frees]])
+            fits.append(restarted(plain, frees=(*plain.frees, *frees), z=z, shared=None))
+        lsq.evaluate(self.problem, fits)
+        lsq.improve(self.problem, fits, 3, 1e-4, lsq.FEW_DAMPINGS)
+        best = min(fits, key=lambda f: f.cost)
+        lsq.improve(self.problem, [best], ROUNDS, 1e-4)
+        errors = self.blocks.errors(self.problem.rows(best.residual))
+        return Candidate(tuple(causes), best, errors)
+
+    def needed(self, model: Candidate) -> Candidate:
+        """Return a model without the common differences that the recording does not need."""
+        while any(cause.common for cause, _ in model.causes):
+            smaller = without_each_cause(self.problem, self.blocks, self.base, model, True)
+            losses = {name: self.loss(less, model) for name, less in smaller.items()}
+            least = min(losses, key=lambda name: losses[name])
+            if losses[least] > 0.0:
+                return model
+            model = smaller[least]
+        return model
+
+    def loss(self, smaller: Candidate, model: Candidate) -> float:
+        """Return the gain lost without a cause beyond that which the rule asks of it.
+
+        Zero or less: the cause is not needed.
+        """
+        gain = self.blocks.gain(smaller.errors, model.errors)
+        unsure = compare.p_value(self.problem, self.blocks, smaller, model, 1)
+        return gain - self.rule.least_gain if unsure <= self.rule.doubt else -1.0
+
+    def select(self, causes: Sequence[Cause]) -> Candidate:
+        """Return the base with the common differences that the recording needs."""
+        chosen = self.chosen([c for c in causes if c.common])
+        if not chosen:
+            return self.base
+        model = self.needed(self.fitted(chosen))
+        if model.causes:
+            model = refit(self.problem, self.blocks, model, 3)
+        complete_jacobian(self.problem, model.fit)
+        return model
+
+
+def inside(free: lsq.Free, value: float) -> float:
+    """Return the internal coordinate of a starting value, moved into the bounds."""
+    low = max(free.low, 1e-9) if free.log else free.low
+    return free.inner(float(np.clip(value, low, free.high)))
