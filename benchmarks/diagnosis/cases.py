@@ -14,17 +14,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.diagnosis.sources import (
+    HOME,
+    Effects,
+    columns_of,
+    draw_effect,
+    draw_rig,
+    outputs_of,
+    sheet_of,
+)
 from pam_envs.arrays import Array
 from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.decide.isolability import base_subspace, projected
-from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.calibrate import calibrate
-from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, inputs_of, start_plant
+from pam_envs.diagnosis.audit.noise import noise_floor
+from pam_envs.diagnosis.causes import catalogue
+from pam_envs.diagnosis.decide.isolability import projected
+from pam_envs.diagnosis.diagnosis import Study
+from pam_envs.diagnosis.fit.single_muscle import start_plant
 from tests.diagnosis import hidden
-
-Effects = list[tuple[hidden.Effect, float]]
 
 NOISE = np.array([hidden.CONTRACTION_NOISE_MM * MM, hidden.PRESSURE_NOISE_BAR * BAR])
 """RMS noise of the sensors [m], [Pa]."""
@@ -56,6 +64,7 @@ class Case:
     campaign: str = "standard"
     noise: float = 1.0  # over the usual noise
     seconds: float = 0.0  # 0 for the whole campaign
+    world: str = HOME
 
     def record(self) -> dict[str, Any]:
         """Return the case in plain types."""
@@ -65,14 +74,16 @@ class Case:
     def title(self) -> str:
         """Short description for messages."""
         parts = [f"{n} {s:.2g}" for n, s in zip(self.names, self.sizes, strict=True)]
-        return f"{self.kind} {' + '.join(parts)} seed {self.seed}".replace("  ", " ")
+        return f"{self.world} {self.kind} {' + '.join(parts)} seed {self.seed}".replace(
+            "  ", " "
+        ).strip()
 
 
 @dataclass(frozen=True)
 class Truth:
     """One hidden effect with its solved amplitude."""
 
-    effect: hidden.Effect
+    effect: Any
     amplitude: float
     size: float  # after the refit of the base, over the usual noise
     raw: float  # before it
@@ -88,7 +99,7 @@ class Truth:
 class Ground:
     """A clean rig under a campaign, and the subspace of the changes that a refit can make."""
 
-    base: hidden.Base
+    base: Any  # the rig
     campaign: hidden.Campaign
     clean: Array  # outputs without effect and noise [m], [Pa], shape (2, T)
     basis: Array  # orthonormal basis of the subspace
@@ -127,31 +138,6 @@ def loudest(rows: Array) -> float:
     return float(np.sqrt((rows**2).mean(axis=1)).max())
 
 
-def outputs_of(base: hidden.Base, effects: Effects, campaign: hidden.Campaign) -> Array:
-    """Return the outputs of a rig without noise, shape (2, T) [m], [Pa]."""
-    run = hidden.simulate(base, effects, campaign)
-    return np.stack([run["contraction_mm"] * MM, run["pressure_bar"] * BAR])
-
-
-def sheet_of(base: hidden.Base, campaign: hidden.Campaign, noise: float = 1.0) -> Rig:
-    """Return the rig file of a rig, with correct declarations."""
-    file = hidden.rig_yaml(base, campaign, noise)
-    return Rig(
-        plant=file["plant"],
-        rest_length=file["muscle"]["rest_length_mm"] * MM,
-        diameter=file["muscle"]["diameter_mm"] * MM,
-        max_pressure=file["regulator"]["max_pressure_bar"] * BAR,
-        load=file["load"],
-        contraction_noise=file["sensors"]["contraction_noise_mm"] * MM,
-        pressure_noise=file["sensors"]["pressure_noise_bar"] * BAR,
-        cycles_since_rest=file["history"]["cycles_since_rest"],
-        rezeroed=file["history"]["rezeroed"],
-        repeats=tuple(tuple(group) for group in file["repeats"]),
-        valve_closed=tuple(file["valve_closed"]),
-        tolerance=file["tolerance"],
-    )
-
-
 def recording_of(columns: dict[str, Any], sheet: Rig, source: str) -> Recording:
     """Return the recording of a rig from its columns."""
     return Recording.from_arrays(
@@ -167,19 +153,17 @@ def recording_of(columns: dict[str, Any], sheet: Rig, source: str) -> Recording:
     )
 
 
-def ground_of(base: hidden.Base, campaign: hidden.Campaign) -> Ground:
-    """Fit the plant's base to a clean rig without noise."""
+def ground_of(base: Any, campaign: hidden.Campaign, seed: int = 0) -> Ground:
+    """Fit the plant's flexible base to a recording of a clean rig."""
     sheet, clean = sheet_of(base, campaign), outputs_of(base, [], campaign)
-    quiet = replace(base, grain_mm=0.0, grain_bar=0.0)
-    columns = hidden.make_recording(quiet, [], campaign, 0, noise_factor=0.0)
-    recording = recording_of(columns, sheet, "clean")
-    family = MuscleFamily(start_plant(sheet), inputs_of(recording, sheet))
-    blocks = Blocks.make(recording.time, clean)
-    _, problem, fitted = calibrate(family, clean, NOISE, blocks, recording.time)
-    return Ground(base, campaign, clean, base_subspace(fitted.fit), problem.order)
+    recording = recording_of(columns_of(base, [], campaign, seed), sheet, "clean")
+    floor = noise_floor(recording, sheet)
+    study = Study.begin(recording, sheet, start_plant(sheet), floor)
+    study.make_flexible(catalogue())
+    return Ground(base, campaign, clean, study.subspace, study.problem.order)
 
 
-def solve(ground: Ground, effect: hidden.Effect, target: float) -> tuple[float, Array] | None:
+def solve(ground: Ground, effect: Any, target: float) -> tuple[float, Array] | None:
     """Return the amplitude and trace of an effect of a target size, or None if out of reach."""
     low, high, amplitude = 0.0, np.inf, min(1.0, target)
     for _ in range(ROUNDS):
@@ -203,16 +187,14 @@ def _next(amplitude: float, size: float, target: float, low: float, high: float)
     return float(guess if may_be_within else 0.5 * (low + high))
 
 
-def _draw(
-    case: Case, attempt: int
-) -> tuple[Ground, list[tuple[hidden.Effect, float, Array]]] | None:
+def _draw(case: Case, attempt: int) -> tuple[Ground, list[tuple[Any, float, Array]]] | None:
     """Draw a rig and its effects; None if a size is out of reach."""
     rng = np.random.default_rng([case.seed, attempt])
-    base = hidden.draw_base(rng, decoy=case.kind == "decoy")
-    ground = ground_of(base, _campaign(case))
+    base = draw_rig(case.world, rng, decoy=case.kind == "decoy")
+    ground = ground_of(base, _campaign(case), case.seed + 7)
     found = []
     for name, size in zip(case.names, case.sizes, strict=True):
-        effect = hidden.draw_effect(name, rng)
+        effect = draw_effect(name, base, rng)
         solved = solve(ground, effect, size)
         if solved is None:
             return None
@@ -239,9 +221,7 @@ def make(case: Case) -> Made:
     effects = [(effect, amplitude) for effect, amplitude, _ in found]
     outputs = outputs_of(ground.base, effects, ground.campaign)
     sheet = sheet_of(ground.base, ground.campaign, case.noise)
-    columns = hidden.make_recording(
-        ground.base, effects, ground.campaign, case.seed + 7, noise_factor=case.noise
-    )
+    columns = columns_of(ground.base, effects, ground.campaign, case.seed + 7, case.noise)
     return Made(
         recording_of(columns, sheet, f"case {case.seed}"),
         sheet,
@@ -252,7 +232,7 @@ def make(case: Case) -> Made:
 
 
 def _truths(
-    ground: Ground, found: list[tuple[hidden.Effect, float, Array]], outputs: Array
+    ground: Ground, found: list[tuple[Any, float, Array]], outputs: Array
 ) -> Iterator[Truth]:
     """Yield the hidden effects; with several, the trace of one is the change when it is removed."""
     for k, (effect, amplitude, alone) in enumerate(found):

@@ -20,7 +20,7 @@ from pam_envs.diagnosis.closed_loop import gain as loops
 from pam_envs.diagnosis.decide import isolability as iso
 from pam_envs.diagnosis.decide.flexible_base import FlexibleBase, shapes_of
 from pam_envs.diagnosis.decide.held_out import HeldOut, choose, compared, hold_out, interleaved
-from pam_envs.diagnosis.decide.isolability import not_testable
+from pam_envs.diagnosis.decide.isolability import base_subspace, not_testable, unseen_rivals
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.structure import Regressors
 from pam_envs.diagnosis.decide.verdict import Decision, decide, effect_traces
@@ -133,10 +133,16 @@ def diagnose(
         step("held-out experiments")
         study.hold_out()
         step("next experiment, closed loop")
-        study.experiment()
+        optional = [("the proposal of an experiment", study.experiment)]
         if closed_loop:
-            study.close_loop(design, simulated, oracle)
-        warnings = (study.short, *checked.warnings, *floor.warnings)
+            optional.append(
+                (
+                    "the comparison in closed loop",
+                    lambda: study.close_loop(design, simulated, oracle),
+                )
+            )
+        lost = [text for name, stage in optional if (text := failure_of(name, stage))]
+        warnings = (study.short, *checked.warnings, *floor.warnings, *lost)
         report = report_of(study, rule, tuple(filter(None, warnings)))
         report = plain({**report, "runtime_s": clock.perf_counter() - started})
         return Diagnosis(
@@ -149,6 +155,15 @@ def diagnose(
             traces=study.traces(),
             study=study,
         )
+
+
+def failure_of(name: str, stage: Callable[[], None]) -> str:
+    """Run an optional stage; return a warning if it fails, since the verdict does not need it."""
+    try:
+        stage()
+    except Exception as error:
+        return f"{name} failed, and is missing in this report: {type(error).__name__}: {error}"
+    return ""
 
 
 @contextmanager
@@ -203,6 +218,7 @@ class Study:
     seed: int = 0
     causes: list[Cause] = field(default_factory=list)
     not_testable: dict[str, str] = field(default_factory=dict)
+    unseen: list[Cause] = field(default_factory=list)  # causes that lack their experiment
     isolability: iso.Isolability | None = None
     short: str = ""
     decision: Decision | None = None
@@ -285,6 +301,18 @@ class Study:
         return self.fitted.problem
 
     @property
+    def subspace(self) -> Array:
+        """Orthonormal basis of the changes that a refit of the flexible base can make, (k, m)."""
+        made = []
+        for k in range(len(self.problem.measured)):
+            for shape in self.problem.shapes:
+                rows = np.zeros(self.problem.measured.shape)
+                rows[k] = shape
+                made.append(rows.ravel()[self.problem.order])
+        stacked = np.vstack([base_subspace(self.normal.fit), *made])
+        return np.asarray(np.linalg.qr(stacked.T)[0].T)
+
+    @property
     def flexible(self) -> FlexibleBase:
         """Selection of the differences in which rigs commonly depart from the base."""
         data = (self.problem, self.family, self.blocks, self.base, self.rule)
@@ -301,6 +329,9 @@ class Study:
         )
         common = {cause.name for cause, _ in self.normal.causes}
         self.causes = [c for c in causes if c.name not in {*self.not_testable, *common}]
+        self.unseen = unseen_rivals(
+            self.problem, self.family, self.normal.fit, causes, self.recording, self.sheet
+        )
 
     def recheck_loads(self) -> None:
         """Repeat the decision with loads refitted within their tolerance if they may explain it."""
@@ -339,6 +370,7 @@ class Study:
             self.regressors,
             self.rule,
             self.seed,
+            self.unseen,
         )
         if self.decision.level and any(cause.common for cause, _ in self.model.causes):
             self.decision.model = self.flexible.needed(self.decision.model)

@@ -22,10 +22,11 @@ AIRS = ("regulator", "flow")
 SWITCH = "regulator.flow"
 """Parameter that selects one of ``AIRS``, 0 or 1."""
 REPLACED = (
-    *("slew_bend", "overlap", "exhaust_ratio", "exhaust_rate", "pilot_lag"),
-    *("pilot_damping", "overlap_leak", "exhaust_taper", "dead_close", "supply_time", "time_constant", "slew_rate"),
+    *("slew_bend", "slew_ratio", "overlap", "exhaust_ratio", "exhaust_rate", "pilot_lag"),
+    *("pilot_damping", "overlap_leak", "exhaust_taper", "dead_close", "supply_time"),
+    *("time_constant", "slew_rate"),
 )
-"""Parameters of a regulator that the orifices replace; the first five are effects that are off."""
+"""Parameters of a regulator that the orifices replace; the first six are effects that are off."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -115,6 +115,9 @@ class ValveEffects:
 
     gain: float = assumed(1.0, "1", 0.5, 1.5, "pressure reached over setpoint", neutral=1.0)
     slew_bend: float = effect("1", 0.0, 1.0, "from a sharp slew limit to a rounded one")
+    slew_ratio: float = assumed(
+        1.0, "1", 0.05, 20.0, "slew rate of exhaust over that of filling", neutral=1.0
+    )
     dead_band: float = effect("Pa", 0.0, 3e5, "error that the valve does not answer")
     dead_close: float = assumed(1.0, "1", 0.0, 1.0, "closing error over dead_band")
     overlap: float = effect("Pa", 0.0, 3e5, "error up to which the spool only leaks")
@@ -136,6 +139,7 @@ class RegulatorEffects(FlowEffects, LineEffects, SupplyEffects, ValveEffects):
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
         ("gain",),
         ("slew_bend",),
+        ("slew_ratio",),
         ("dead_band", "dead_close"),
         ("overlap", "overlap_leak"),
         ("exhaust_ratio", "exhaust_taper"),
@@ -370,6 +374,7 @@ def regulate_with_effects(
     shift = over * (1.0 - within) if abs(goal - pressure) > over else 0.0
     lag = lag / within if abs(goal - pressure) < over else lag
     aim = goal + shift if goal < pressure else goal - shift
+    slew = slew * (fixed[effects + AIR.slew_ratio][j] if aim < pressure else 1.0)
     reached = regulator_step(pressure, aim, lag, 1.0 / lag, slew, 1.0 / slew, h)
     free = (aim - pressure) * (1.0 - decay(h / lag))
     most = slew * max(h, 1e-9)
@@ -437,6 +442,7 @@ def valve_effects_on(fixed: Any, effects: int) -> int:
         + count_on(fixed[effects + AIR.overlap], 0.0)
         + count_on(fixed[effects + AIR.exhaust_rate], UNCHOKED)
         + count_on(fixed[effects + AIR.slew_bend], 0.0)
+        + count_on(fixed[effects + AIR.slew_ratio], 1.0)
         + count_on(fixed[effects + AIR.pilot_lag], 0.0)
     )
     daily = (

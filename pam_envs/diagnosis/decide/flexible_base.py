@@ -6,7 +6,7 @@ have been fitted (kennedy2001). A difference that the recording does not need is
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -33,6 +33,12 @@ SETTLING = (0.5, 2.0, 6.0)
 MOST_STARTS = 6
 """Largest number of restarts that have their own settling."""
 ROUNDS = 10
+FAR = 8.0
+"""Cost per reading of the base from which a fit also starts at the guess of the force balance."""
+CLEAR = 1.0
+"""Gain of a difference from which it is needed without a further look."""
+NOISE_ONLY = 1.06
+"""Mean square of the residual over the noise below which the base needs no difference."""
 STARTS = 2
 """Number of starting values of each difference."""
 
@@ -91,8 +97,10 @@ class FlexibleBase:
         """Return the base extended by some causes at once, from the best of several starts."""
         fits, plain = [], self.base.fit
         begins = [plain.z]
-        if self.guess:
-            begins.append(np.array([inside(f, self.guess.get(f.name, f.start)) for f in plain.frees]))
+        if self.guess and plain.cost > FAR * self.problem.seen:
+            begins.append(
+                np.array([inside(f, self.guess.get(f.name, f.start)) for f in plain.frees])
+            )
         for (_, begin), k in product(enumerate(begins), range(STARTS)):
             frees = tuple(
                 free
@@ -100,26 +108,36 @@ class FlexibleBase:
                 for free in frees_for(
                     self.family,
                     form,
-                    [self.guess.get(t.name, t.starts[min(k, len(t.starts) - 1)]) for t in form.terms],
+                    [
+                        self.guess.get(t.name, t.starts[min(k, len(t.starts) - 1)])
+                        for t in form.terms
+                    ],
                 )
             )
             z = np.concatenate([begin, [inside(f, f.start) for f in frees]])
             fits.append(restarted(plain, frees=(*plain.frees, *frees), z=z, shared=None))
         lsq.evaluate(self.problem, fits)
-        lsq.improve(self.problem, fits, 3, 1e-4, lsq.FEW_DAMPINGS)
+        lsq.improve(self.problem, fits, 2, 1e-4, lsq.FEW_DAMPINGS)
         best = min(fits, key=lambda f: f.cost)
-        lsq.improve(self.problem, [best], ROUNDS, 1e-4)
+        lsq.improve(self.problem, [best], ROUNDS, 1e-3)
         errors = self.blocks.errors(self.problem.rows(best.residual))
         return Candidate(tuple(causes), best, errors)
 
     def needed(self, model: Candidate) -> Candidate:
-        """Return a model without the common differences that the recording does not need."""
+        """Return a model without the common differences that the recording does not need.
+
+        It names those with a clear gain; the parameters of the others remain, as a calibration.
+        """
+        data = (self.problem, self.blocks, self.base)
         while any(cause.common for cause, _ in model.causes):
-            smaller = without_each_cause(self.problem, self.blocks, self.base, model, True)
+            smaller = without_each_cause(*data, model, True, CLEAR)
             losses = {name: self.loss(less, model) for name, less in smaller.items()}
             least = min(losses, key=lambda name: losses[name])
             if losses[least] > 0.0:
-                return model
+                gains = {n: self.blocks.gain(c.errors, model.errors) for n, c in smaller.items()}
+                unnamed = {n for n, gain in gains.items() if gain < self.rule.common_gain}
+                kept = tuple((c, f) for c, f in model.causes if c.name not in unnamed)
+                return replace(model, causes=kept)
             model = smaller[least]
         return model
 
@@ -135,13 +153,18 @@ class FlexibleBase:
     def select(self, causes: Sequence[Cause]) -> Candidate:
         """Return the base with the common differences that the recording needs."""
         chosen = self.chosen([c for c in causes if c.common])
-        if not chosen:
+        if not chosen or self.fits():
             return self.base
         model = self.needed(self.fitted(chosen))
-        if model.causes:
-            model = refit(self.problem, self.blocks, model, 3)
+        if len(model.fit.frees) > len(self.base.fit.frees):
+            model = refit(self.problem, self.blocks, model, 2)
         complete_jacobian(self.problem, model.fit)
         return model
+
+    def fits(self) -> bool:
+        """Return whether the base leaves hardly more than noise on every channel."""
+        some = self.blocks.counts.sum(axis=1) > 0
+        return bool(np.all(self.blocks.means(self.base.errors)[some] < NOISE_ONLY))
 
 
 def inside(free: lsq.Free, value: float) -> float:

@@ -180,10 +180,11 @@ def _side_by_side(
         return []
     complete_jacobian(problem, base.fit)
     shared = share(problem, base.fit)
-    fits = []
+    fits, known = [], dict(zip((f.name for f in base.fit.frees), base.fit.z, strict=True))
     for c in candidates:
-        start = np.concatenate([base.fit.z, c.fit.z[len(base.fit.z) :]])
-        fits.append(restarted(c.fit, z=start, shared=shared))
+        start = [known.get(f.name, z) for f, z in zip(c.fit.frees, c.fit.z, strict=True)]
+        leads = [f.name for f in c.fit.frees[: len(known)]] == list(known)
+        fits.append(restarted(c.fit, z=np.array(start), shared=shared if leads else None))
     evaluate(problem, fits)
     improve(problem, fits, ROUNDS, 1e-4, FEW_DAMPINGS)
     return [replace(c, fit=fit) for c, fit in zip(candidates, fits, strict=True)]

@@ -176,6 +176,25 @@ def not_testable(
     return found, {c.name: reasons[c.name] for c in causes if c.name in reasons}
 
 
+def unseen_rivals(
+    problem: Problem,
+    family: PlantFamily,
+    base: Fit,
+    causes: Sequence[Cause],
+    recording: Recording,
+    sheet: Rig,
+) -> list[Cause]:
+    """Return the causes that lack their experiment, but would show on the recording.
+
+    None of them can be named, and a cause that looks like one of them is in doubt.
+    """
+    reasons = undecidable(recording, sheet, causes)
+    lacking = [c for c in causes if c.name in reasons]
+    found = isolability(problem, family, base, lacking)
+    small = _too_small(found, lacking)
+    return [c for c in lacking if c.name not in small]
+
+
 def _too_small(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
     reach = dict(zip(found.names, found.reach, strict=True))
     return {

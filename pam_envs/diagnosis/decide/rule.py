@@ -14,7 +14,7 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "2"  # part of every report
+    version: str = "3"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     trial_penalty: float = (
@@ -32,6 +32,9 @@ class Rule:
     apart: float = 0.1
     least_blocks: int = 6  # number of held-out blocks with motion that a decision needs
     doubt: float = 0.05
+    # gain of a common difference from the base (another law, another drive of the friction) above
+    # which it is named; a smaller one is a calibration
+    common_gain: float = 0.3
     # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
     # this share of the gain of a model that leaves only noise: otherwise it corrects the first form
     second_gain: float = 0.1
@@ -40,7 +43,7 @@ class Rule:
     second_clear: float = 0.75
     hint: float = 0.4  # share of the required gain that a further search must reach at first
     beam: int = 3  # number of first causes from which a second is searched
-    most: int = 3  # largest number of named causes
+    most: int = 6  # largest number of named causes
     # gain, and share of the gain, that a cause must have over one that it contains
     simpler: float = 0.05
     simpler_share: float = 0.03

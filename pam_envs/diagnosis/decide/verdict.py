@@ -78,6 +78,14 @@ class Ladder:
     regressors: Regressors
     rule: Rule
     seed: int = 0
+    unseen: frozenset[str] = frozenset()  # causes that may be rivals, but cannot be named
+
+    def named_first(self, rivals: list[Candidate]) -> list[Candidate]:
+        """Return models, the best one that may be named first."""
+        best = next((r for r in rivals if self.unseen.isdisjoint(r.names)), None)
+        if best is None:
+            return []
+        return [best, *(r for r in rivals if r is not best)]
 
     def gain(self, model: Candidate, base: Candidate | None = None) -> float:
         """Return the penalised gain of a model over another one (default: the base)."""
@@ -96,6 +104,9 @@ class Ladder:
         if not rivals:
             return []
         rivals = compare.prefer_simpler(self.blocks, self.base, rivals, self.rule)
+        rivals = self.named_first(rivals)
+        if not rivals:
+            return []
         found, repaired = [(rivals[0], rivals)], False
         while len(found) < self.rule.most:
             larger = self.larger(found)
@@ -125,7 +136,10 @@ class Ladder:
             for first in rivals[1 : self.rule.beam]:
                 larger += search(*data, first, self.causes, 2)[:4]
         larger.sort(key=lambda c: -self.gain(c))
-        return compare.prefer_simpler(self.blocks, self.base, compare.distinct(larger), self.rule)
+        larger = compare.distinct(larger)
+        return self.named_first(
+            compare.prefer_simpler(self.blocks, self.base, larger, self.rule) if larger else []
+        )
 
     def without_one_cause(self, model: Candidate, known: Models) -> Models | None:
         """Return smaller models if one started from a larger model beats the known one.
@@ -133,11 +147,13 @@ class Ladder:
         A fit may need a second cause to leave a local optimum, and keep the better one without it.
         """
         made = without_each_cause(self.problem, self.blocks, self.base, model).values()
-        best = max(made, key=self.gain)
-        if self.gain(best) < self.gain(known[0]) + self.rule.simpler:
+        best = max(
+            (m for m in made if self.unseen.isdisjoint(m.names)), key=self.gain, default=None
+        )
+        if best is None or self.gain(best) < self.gain(known[0]) + self.rule.simpler:
             return None
         rivals = [best, *(r for r in known[1] if set(r.names) != set(best.names))]
-        rivals = compare.prefer_simpler(self.blocks, self.base, rivals, self.rule)
+        rivals = self.named_first(compare.prefer_simpler(self.blocks, self.base, rivals, self.rule))
         return rivals[0], rivals
 
     def evidence(self, levels: Sequence[Level]) -> dict[str, Any]:
@@ -201,6 +217,7 @@ class Ladder:
         every = replace(self.blocks, held_out=np.ones_like(self.blocks.held_out))
         ranked = sorted(again, key=lambda c: -compare.penalised_gain(every, base, c, self.rule))
         order = compare.prefer_simpler(every, base, ranked, self.rule)
+        order = self.named_first(order) or order
         draws = every.draws(self.rule.draws, self.seed)
         rows = [self.row(every, base, c, order[0], draws) for c in order]
         places = [places[next(i for i, c in enumerate(again) if c is o)] for o in order]
@@ -229,9 +246,23 @@ def decide(
     regressors: Regressors,
     rule: Rule,
     seed: int = 0,
+    unseen: Sequence[Cause] = (),
 ) -> Decision:
-    """Search for causes, add further ones while they are accepted, and give the verdict."""
-    ladder = Ladder(problem, family, blocks, base, causes, regressors, rule, seed)
+    """Search for causes, add further ones while they are accepted, and give the verdict.
+
+    ``unseen`` are causes that lack their experiment: rivals that are never named.
+    """
+    ladder = Ladder(
+        problem,
+        family,
+        blocks,
+        base,
+        [*causes, *unseen],
+        regressors,
+        rule,
+        seed,
+        frozenset(cause.name for cause in unseen),
+    )
     levels = [ladder.level(base, []), *(ladder.level(*models) for models in ladder.models())]
     evidence = ladder.evidence(levels)
     judged = judge(evidence, rule)
@@ -241,7 +272,10 @@ def decide(
     selected = levels[judged.level]
     rivals = selected.rivals if judged.level else levels[min(1, len(levels) - 1)].rivals
     still = [rivals[k] for k in judged.open_rivals]
-    return Decision(judged.verdict, selected.model, rivals, still, evidence, judged.level)
+    verdict = judged.verdict
+    if verdict == "adequate" and base.causes:
+        verdict = "named"
+    return Decision(verdict, selected.model, rivals, still, evidence, judged.level)
 
 
 def effect_traces(problem: Problem, family: PlantFamily, model: Candidate) -> dict[str, Array]:

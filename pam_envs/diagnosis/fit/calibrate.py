@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -56,7 +57,11 @@ def calibrate(
     the regulator may have.
     """
     extra = np.zeros((0, 0)) if shapes is None else shapes
-    problem = Problem(family.simulate, measured, noise, blocks.train, time, family.tie, extra)
+    longest = float(np.nanmax(measured[0], initial=0.0))
+    family = dataclasses.replace(family, longest=longest)
+    problem = Problem(
+        family.simulate, measured, noise, blocks.train, time, family.tie, extra, family.penalty
+    )
     column, rate = family.column, None
     found: dict[str, float] = {}
     if np.isfinite(measured[1]).any():
@@ -65,7 +70,9 @@ def calibrate(
         rate = next((r for r in rates if all(t.name in found for t in r.terms)), None)
         if family.plant.air == "regulator" and found[LAG] < FAST:
             family = family.finer(FINE_STEP)
-        problem = dataclasses.replace(problem, simulate=family.simulate, tie=family.tie)
+        problem = dataclasses.replace(
+            problem, simulate=family.simulate, tie=family.tie, penalty=family.penalty
+        )
         column = column_of(fit, fit.z)
     frees = family.base()
     tried, law = [frees], {}
@@ -125,25 +132,30 @@ def regulator(
     if flows or not can_flow(family) or blocks.means(before)[1] < FITS:
         return family, chosen
     other = dataclasses.replace(family, plant=orifices_of(family.plant))
+    full = family.plant.regulator.max_pressure
     named = [f for f in other.base() if f.name.startswith("regulator.") or f.name == CLOCK]
     starts = [
         tuple(
-            dataclasses.replace(f, start=size) if f.name == "regulator.conductance" else f
-            for f in named
+            dataclasses.replace(f, start=begin.get(f.name, f.start)) for f in named
         )
-        for size in CONDUCTANCES
+        for begin in (
+            {"regulator.conductance": size, "regulator.source_pressure": source}
+            for size, source in product(CONDUCTANCES, (1.05 * full, 1.5 * full))
+        )
     ]
     only = dataclasses.replace(only, simulate=other.simulate, tie=other.tie)
-    flow = _simplest(only, blocks, [Fit.at_start(frees, other.column) for frees in starts])
+    flow = _simplest(only, blocks, [Fit.at_start(frees, other.column) for frees in starts], 12)
     if blocks.gain(before, blocks.errors(only.rows(flow.residual))) < FLOW_GAIN:
         return family, chosen
     return other, flow
 
 
-def _simplest(problem: Problem, blocks: Blocks, fits: list[Fit]) -> Fit:
+def _simplest(
+    problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS
+) -> Fit:
     """Return the best of some fits; one with more parameters needs a gain."""
     evaluate(problem, fits)
-    improve(problem, fits, GUESS_ROUNDS, 1e-4)
+    improve(problem, fits, rounds, 1e-4)
     errors = [blocks.errors(problem.rows(fit.residual)) for fit in fits]
     chosen = 0
     for k in range(1, len(fits)):

@@ -36,9 +36,7 @@ def frees_for(family: lsq.PlantFamily, form: Form, values: Sequence[float]) -> t
     for term, value in zip(form.terms, values, strict=True):
         given = {k: getattr(term, k) for k in ("low", "high", "scale")}
         changes = {k: v for k, v in given.items() if v is not None}
-        made.append(
-            family.free(term.name, log=term.log, start=value, prior=term.prior, **changes)
-        )
+        made.append(family.free(term.name, log=term.log, start=value, prior=term.prior, **changes))
     return tuple(made)
 
 
@@ -135,10 +133,12 @@ def without_each_cause(
     base: Candidate,
     model: Candidate,
     common_only: bool = False,
+    clear: float = np.inf,
 ) -> dict[str, Candidate]:
     """Return the model refitted without each cause that the base lacks, the better of two starts.
 
-    ``common_only`` leaves out the causes in which rigs do not commonly differ.
+    ``common_only`` leaves out the causes in which rigs do not commonly differ. A refit that still
+    loses a gain of ``clear`` after a few rounds is not polished.
     """
     fits, labels = [], []
     for removed, form in model.causes:
@@ -152,6 +152,8 @@ def without_each_cause(
         for start in (z, of_base):
             fits.append(restarted(model.fit, frees=frees, z=start.copy(), shared=None))
             labels.append(removed.name)
+    if not fits:
+        return {}
     complete_jacobian(problem, base.fit)
     shared = lsq.share(problem, base.fit)
     for fit in fits:
@@ -159,7 +161,8 @@ def without_each_cause(
     lsq.evaluate(problem, fits)
     lsq.improve(problem, fits, FEW_ROUNDS, 1e-4, lsq.FEW_DAMPINGS)
     best = best_by_name(zip(labels, fits, strict=True))
-    polish(problem, list(best.values()))
+    close = [f for f in best.values() if np.log(f.cost / model.fit.cost) < clear]
+    polish(problem, close)
     return {
         name: Candidate(
             tuple(c for c in model.causes if c[0].name != name),

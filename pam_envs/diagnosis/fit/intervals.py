@@ -14,13 +14,21 @@ Json = dict[str, Any]
 
 LEAST_LEFT = 2
 """Least number of degrees of freedom, for records with hardly more blocks than parameters."""
+NEAR_BOUND = 1e-9
+"""Distance from a bound, over the value or over the span, that counts as at the bound."""
 WIDE_LOG, WIDE = 10.0, 0.5
 """An interval wider than this factor, or this share of the bounds, is not identified."""
 
 
 def at_bound(free: Free, value: float) -> bool:
-    """Return whether a parameter is at one of its bounds."""
-    return bool(value <= free.low or value >= free.high)
+    """Return whether a parameter is at one of its bounds, within the rounding of a logarithm."""
+    slack = NEAR_BOUND * (abs(value) if free.log else free.high - free.low)
+    return bool(value <= free.low + slack or value >= free.high - slack)
+
+
+def middle(free: Free) -> float:
+    """Return the middle of a parameter's bounds, the geometric one on a logarithmic scale."""
+    return float(np.sqrt(free.low * free.high)) if free.log else 0.5 * (free.low + free.high)
 
 
 def interval_half_widths(problem: Problem, blocks: Blocks, fit: Fit) -> Array:
@@ -69,7 +77,10 @@ def span(free: Free, value: float, z: float, half: float) -> Json:
     else:
         wide = high - low > WIDE * (free.high - free.low)
     return {
-        "interval": [None if value <= free.low else low, None if value >= free.high else high],
+        "interval": [
+            None if at_bound(free, value) and value < middle(free) else low,
+            None if at_bound(free, value) and value >= middle(free) else high,
+        ],
         "at_bound": at_bound(free, value),
         "not_identified": bool(wide),
     }

@@ -128,6 +128,8 @@ class Problem:
     # (k, T): shapes that the readings of every channel may contain beside the plant's (zero offset,
     # settling at the start); their sizes are solved for in every residual
     shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    # cost of columns (n, p) that are not physical, shape (n,)
+    penalty: Callable[[Array], Array] = lambda columns: np.zeros(len(columns))
 
     @cached_property
     def order(self) -> Indices:
@@ -202,7 +204,8 @@ def _cost(problem: Problem, fit: Fit, z: Array, residual: Array) -> float:
         for f, v in zip(fit.frees, z, strict=True)
         if np.isfinite(f.prior)
     )
-    return float(np.einsum("i,i", seen, seen)) + float(priors)
+    unphysical = problem.penalty(column_of(fit, z)[None])[0]
+    return float(np.einsum("i,i", seen, seen)) + float(priors) + float(unphysical)
 
 
 def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:

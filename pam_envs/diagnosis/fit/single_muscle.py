@@ -7,11 +7,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebval
 
 from pam_envs.arrays import Array
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.muscle.effects import MAP_TERMS
 from pam_envs.parameters import declarations
 from pam_envs.plants.core.plant import UnstableParameters
 from pam_envs.plants.single_muscle import rows as R
@@ -22,6 +24,11 @@ from pam_envs.pneumatics.flow import SWITCH
 THRESHOLDS = (3e3, 7e3, 1.2e4, 1.8e4, 2.5e4, 3.3e4, 4.2e4, 5.2e4, 6.3e4, 7.6e4, 9.1e4, 1.1e5)
 """Thresholds [Pa] of the base's play operators."""
 LEAST_LINEAR = 0.02
+LEAST_STIFFNESS, LEAST_STIFFNESS_OF, LEAST_GAIN = 1.0, 50.0, 0.1
+"""Least stiffness over strain, in parts of 50 N, and least slope of the force by pressure, over the
+area: a law below them is not monotone."""
+NOT_MONOTONE, REACH = 1e4, 1.1
+"""Cost of a unit of such a violation, and the checked range over the recorded one."""
 SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.gain": {"scale": 0.01},
     "regulator.time_constant": {"log": True, "prior": 1.5},
@@ -86,6 +93,7 @@ class MuscleFamily:
     plant: SingleMuscle
     inputs: Inputs
     clock: float = 0.0  # largest offset of the readings' clock [s]
+    longest: float = 0.0  # largest recorded contraction [m]; 0 if none was recorded
 
     channels = CHANNELS
     fallback_noise = (5e-5, 1e3)
@@ -134,6 +142,58 @@ class MuscleFamily:
         weights *= np.minimum(1.0, (1.0 - LEAST_LINEAR) / np.maximum(total, 1e-12))[:, None]
         columns[:, R.LINEAR] = 1.0 - weights.sum(axis=1)
 
+    def penalty(self, columns: Array) -> Array:
+        """Return the cost of static laws that are not monotone, shape (n,).
+
+        The force has to fall with contraction and rise with pressure, over the recorded range.
+        """
+        cost = np.zeros(len(columns))
+        if self.longest <= 0.0:
+            return cost
+        w, e = (v[None] for v in np.meshgrid(*self._grid, indexing="ij"))
+
+        def value(name: str) -> Array:
+            return columns[:, R.place(name), None, None]  # type: ignore[no-any-return]
+
+        area, taper, curve = (value(f"muscle.area{part}") for part in ("", "_taper", "_curve"))
+        braid = value("muscle.braid_strain")
+        stiff = area * (taper + 2.0 * curve * e) * w
+        stiff = stiff + value("muscle.braid_force") / braid * np.exp(-e / braid)
+        stiff = stiff + value("muscle.stiffness") + 2.0 * value("muscle.softening") * e
+        stiff = stiff + 3.0 * value("muscle.hardening") * e**2
+        stiff = stiff + 4.0 * value("muscle.stiffening") * e**3
+        gain = area * (1.0 - (taper + curve * e) * e)
+        sizes = columns[:, R.MUSCLE_MAP_05 : R.MUSCLE_MAP_05 + len(MAP_TERMS)]
+        slopes, gains = self._map_slopes
+        stiff = stiff - np.tensordot(sizes, slopes, 1)
+        gain = gain + np.tensordot(sizes, gains, 1)
+        lacks = np.maximum(0.0, LEAST_STIFFNESS - stiff / LEAST_STIFFNESS_OF)
+        flat = np.maximum(0.0, LEAST_GAIN - gain / area)
+        cost = (lacks**2 + flat**2).sum(axis=(1, 2))
+        return np.asarray(NOT_MONOTONE * cost, np.float64)
+
+    @cached_property
+    def _grid(self) -> tuple[Array, Array]:
+        """Pressures [Pa] and strains at which the static law is checked."""
+        full = self.plant.regulator.max_pressure
+        reach = REACH * self.longest / self.plant.muscle.rest_length
+        return np.linspace(0.0, full, 6), np.linspace(0.0, reach, 8)
+
+    @cached_property
+    def _map_slopes(self) -> tuple[Array, Array]:
+        """Derivatives of the map's terms by strain and pressure on the grid, (terms, 6, 8)."""
+        law = self.plant.muscle
+        u = np.clip(2.0 * self._grid[0] / law.map_pressure - 1.0, -1.0, 1.0)
+        s = np.clip(2.0 * self._grid[1] / law.map_strain - 1.0, -1.0, 1.0)
+        eye = np.eye(6)
+        of = [chebval(u, eye[p]) for p, _ in MAP_TERMS]
+        by = [chebval(u, chebder(eye[p])) * 2.0 / law.map_pressure for p, _ in MAP_TERMS]
+        of_e = [chebval(s, eye[q]) for _, q in MAP_TERMS]
+        by_e = [chebval(s, chebder(eye[q])) * 2.0 / law.map_strain for _, q in MAP_TERMS]
+        slopes = np.array([np.outer(a, b) for a, b in zip(of, by_e, strict=True)])
+        gains = np.array([np.outer(a, b) for a, b in zip(by, of_e, strict=True)])
+        return slopes, gains
+
     def free(self, name: str, **changes: Any) -> Free:
         """Return the fit settings of a parameter; ``changes`` override its declaration."""
         if name.startswith("hysteresis.weight["):
@@ -142,7 +202,9 @@ class MuscleFamily:
             start = float(self.column[R.WEIGHT + k])
             return Free(name, R.WEIGHT + k, **{**weight, "start": start, **changes})
         if name == CLOCK:
-            made = dict(low=-self.clock, high=self.clock, scale=0.01, start=0.0, prior=50 * self.clock)
+            made = dict(
+                low=-self.clock, high=self.clock, scale=0.01, start=0.0, prior=50 * self.clock
+            )
             return Free(name, len(self.column) - 1, **{**made, **changes})
         d, value = declared(self.plant, name), self.plant.value(name)
         made = dict(low=d.low, high=d.high, start=value)

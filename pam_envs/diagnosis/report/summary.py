@@ -38,6 +38,7 @@ def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, An
         },
         "error_before": _errors(study, held.base),
         "error_after": _errors(study, held.model) if decision.model.causes else None,
+        "explained": _explained(study) if decision.model.causes else None,
         "residual_structure": {
             "before": _structure(study, study.base),
             "after": _structure(study, study.model),
@@ -59,8 +60,54 @@ def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, An
             "seed": held.seed,
         },
     }
+    report["incomplete"] = decision.verdict == "named" and _incomplete(report)
     report["text"] = sentence(report, rule)
     return report
+
+
+FAR = 1.5
+"""Error over the noise floor, and over the black box, from which a named cause is incomplete."""
+
+
+def _explained(study: Any) -> dict[str, Any]:
+    """Return what the causes explain of the error above the noise floor, by channel.
+
+    ``share`` is the removed share of the mean square above the floor; ``black_box`` the held-out
+    error of the extended plant with a flexible regression of its residual, fitted to the same
+    training blocks, and ``depends_on`` the variables that the rest varies with.
+    """
+    held: HeldOut = study.held
+    made: dict[str, Any] = {}
+    for k, c in seen(study):
+        use = held.rows & np.isfinite(study.problem.measured[k])
+        if not use.any():
+            continue
+        scale = study.problem.noise[k] / SCALE[c]
+        floor = study.floor_of(c)[0] / SCALE[c]
+        rows = [held.problem.rows(m.fit.residual)[k] for m in (held.base, held.model)]
+        before, after = (float(np.sqrt(np.mean(row[use] ** 2))) * scale for row in rows)
+        left = np.where(np.isfinite(study.problem.measured[k]), rows[1], np.nan)
+        over = before**2 - floor**2
+        lower = np.sqrt(max(0.0, 1.0 - flexible_r2(left, study.regressors, study.blocks)))
+        shares = {n: binned_r2(left, v, study.blocks) for n, v in study.regressors.values.items()}
+        made[c] = {
+            "before": before,
+            "after": after,
+            "floor": floor,
+            "black_box": after * lower,
+            "unit": UNITS[c],
+            "share": min(1.0, (before**2 - max(after, floor) ** 2) / over) if over > 0.0 else None,
+            "depends_on": [n for n, share in shares.items() if share > VARIES_WITH],
+        }
+    return made
+
+
+def _incomplete(report: Mapping[str, Any]) -> bool:
+    """Return whether a named cause leaves an error far above floor and black box."""
+    return any(
+        e["after"] > FAR * e["floor"] and e["after"] > FAR * e["black_box"]
+        for e in (report["explained"] or {}).values()
+    )
 
 
 def _errors(study: Any, candidate: Candidate) -> dict[str, Any]:
@@ -151,12 +198,35 @@ def sentence(report: Report, rule: Rule) -> str:
         )
     if verdict == "unexplained":
         return _unexplained(report, rule)
-    text = f"The simulation lacks {enumeration(_titles(report))}: with it {_fell(report)}."
-    text += _doubts(report)
+    unseen = [r["title"] for r in report["rivals"] if r["why"] == "not excluded" and r["unseen"]]
+    names = enumeration(_titles(report))
+    if unseen:
+        names += f", or {enumeration(unseen)}, which this recording cannot test"
+    text = f"The simulation lacks {names}: with {_titles(report)[0]} {_fell(report)}."
+    if len(report["causes"]) > 1 or not unseen:
+        text = f"The simulation lacks {names}: with it {_fell(report)}."
+    text += _share_text(report) + _doubts(report)
     if verdict == "ambiguous":
         text += _not_excluded(report)
     if report["closed_loop"] is not None:
         text += f" {report['closed_loop']['text']}"
+    return text
+
+
+def _share_text(report: Report) -> str:
+    """Return the explained share of the error, and what the rest depends on."""
+    text = ""
+    for channel, e in (report["explained"] or {}).items():
+        if e["share"] is None or e["before"] <= FAR * e["floor"]:
+            continue
+        text += f" This explains {100 * max(e['share'], 0.0):.0f} % of the error of the {channel}"
+        text += f" above the noise ({e['before']:.3g} to {e['after']:.3g} {e['unit']}"
+        text += f", black box {e['black_box']:.3g})."
+    if report["incomplete"]:
+        rest = {n for e in report["explained"].values() for n in e["depends_on"]}
+        text += " The cause is incomplete: an error far above noise and black box remains"
+        words = enumeration([n.replace("_", " ") for n in sorted(rest)])
+        text += f", which varies with {words}." if rest else "."
     return text
 
 

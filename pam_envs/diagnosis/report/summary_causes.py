@@ -39,7 +39,7 @@ def causes(study: Any) -> list[Json]:
     found = spans(problem, study.blocks, model.fit)
     values = model.fit.values()
     traces = effect_traces(problem, family, model)
-    basis = base_subspace(study.base.fit)
+    basis = base_subspace(study.normal.fit)
     made = []
     for cause, form in model.causes:
         trace = traces[cause.name]
@@ -75,11 +75,14 @@ def causes(study: Any) -> list[Json]:
 
 
 def calibration(study: Any) -> list[Json]:
-    """Return the base parameters as refitted in the final model."""
+    """Return the parameters of the final model beside those of its causes."""
     found = spans(study.problem, study.blocks, study.model.fit)
     after, made = study.model.fit.values(), []
     column = study.family.column
-    for free in study.base.fit.frees:
+    of_causes = {t.name for _, form in study.model.causes for t in form.terms}
+    for free in study.model.fit.frees:
+        if free.name in of_causes:
+            continue
         value, before = after[free.name], float(column[free.place])
         unit = unit_of(study.family.plant, free.name)
         tolerance = study.sheet.tolerance.get(free.name)
@@ -167,4 +170,5 @@ def _rival(study: Any, k: int, rival: Candidate, row: Mapping[str, Any], why: st
         "judged": {key: row[key] for key in ("gain", "better")},
         "why": why,
         "excluded": why in EXCLUDED,
+        "unseen": not {c.name for c in study.unseen}.isdisjoint(rival.names),
     }

@@ -309,9 +309,7 @@ def seen_pressure(rows: Any, j: int) -> float:
 
 
 @kernel
-def forces(
-    rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, maps: int
-) -> None:
+def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, maps: int) -> None:
     """Write the linearised motion of a tile, the effective pressure going from ``was``.
 
     Rows 3 to 7 of ``own``, per unit mass: stiffness, push at the predicted middle, jerk, damping,
@@ -393,7 +391,9 @@ def move(
     if strands > 0:
         for j in range(LANES):
             width[j] = x[j] / fixed[R.MUSCLE_REST_LENGTH][j]
-        slip_strands(rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_BREAK, width, rows[R.DRIVE])
+        slip_strands(
+            rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_BREAK, width, rows[R.DRIVE]
+        )
     shown = rows[EFFECTS_AT + S.shown]
     for j in range(LANES):
         before[j] = shown[j]

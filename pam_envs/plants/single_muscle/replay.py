@@ -73,6 +73,7 @@ TILE = 16
 COSTLY = (
     (
         "regulator.slew_bend",
+        "regulator.slew_ratio",
         "regulator.dead_band",
         "regulator.overlap",
         "regulator.exhaust_ratio",

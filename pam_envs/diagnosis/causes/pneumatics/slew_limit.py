@@ -16,6 +16,7 @@ CAUSE = Cause(
             (
                 Term("regulator.slew_rate", (3e5, 1e6, 3e6, 8e6), low=5e4, high=1e8, log=True),
                 Term("regulator.slew_bend", (0.5,), scale=0.5, amount=False),
+                Term("regulator.slew_ratio", (1.0,), log=True, amount=False, prior=1.5),
             ),
         ),
         Form(

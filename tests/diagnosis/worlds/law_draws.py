@@ -1,0 +1,155 @@
+"""Draws of the constants of each static law."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .laws import MAP_PRESSURE, MAP_SHAPE, MAP_STRAIN
+
+Constants = tuple[float, ...]
+
+
+def _exponential(rng: np.random.Generator, area: float) -> Constants:
+    top = rng.uniform(370.0, 480.0) * area
+    shape = (0.466, 5.17, 0.785) if rng.random() < 0.5 else (0.52, 4.6, 0.66)
+    a0, a1, a3 = (value * rng.uniform(0.93, 1.07) for value in shape)
+    return (top, a0, a1, a3, rng.uniform(0.150, 0.185))
+
+
+def _polynomial(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        rng.uniform(72.0, 88.0) * area,
+        rng.uniform(-3.0, -1.0) * area,
+        rng.uniform(4.0, 5.0),
+        rng.uniform(2.5, 5.0),
+        rng.uniform(7000.0, 9500.0) * area,
+        rng.uniform(0.016, 0.022),
+        rng.uniform(0.002, 0.006) / area,
+        rng.uniform(6e3, 14e3) * area,
+    )
+
+
+def _sine(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        rng.uniform(370.0, 490.0) * area,
+        rng.uniform(0.26, 0.34),
+        rng.uniform(0.16, 0.26),
+        rng.uniform(5500.0, 8000.0) * area,
+        rng.uniform(0.008, 0.013),
+    )
+
+
+def _bundle(rng: np.random.Generator, area: float) -> Constants:
+    slack = np.sort(rng.uniform(0.0, rng.uniform(0.025, 0.05), 8))
+    slack[0] = 0.0
+    head = (
+        rng.uniform(400.0, 520.0) * area,
+        rng.uniform(0.25, 0.32),
+        rng.uniform(1.3, 1.7),
+        rng.uniform(0.12, 0.2),
+        rng.uniform(5500.0, 8000.0) * area,
+        rng.uniform(0.008, 0.013),
+        rng.uniform(0.015, 0.03),
+        0.0,
+    )
+    return (*head, *slack.tolist())
+
+
+def _braid(rng: np.random.Generator, area: float) -> Constants:
+    angle = np.radians(rng.uniform(25.0, 28.5))
+    return (
+        7.85 * area * rng.uniform(0.9, 1.1),
+        float(np.cos(angle) ** 2),
+        rng.uniform(0.1, 0.25),
+        rng.uniform(1.5, 3.0),
+        rng.uniform(22.0, 36.0) * area,
+        rng.uniform(3000.0, 4500.0) * area,
+        rng.uniform(0.006, 0.014),
+    )
+
+
+def _tangent(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        2.543 * rng.uniform(0.97, 1.03),
+        1.92 * rng.uniform(0.95, 1.05),
+        2.0265,
+        0.461 * rng.uniform(0.98, 1.02),
+        rng.uniform(0.16, 0.2),
+        0.331e-3 * rng.uniform(0.7, 1.3) / area,
+        0.0123 * rng.uniform(0.85, 1.15) / area,
+    )
+
+
+def _sarosi(rng: np.random.Generator, area: float) -> Constants:
+    return (area * rng.uniform(0.7, 1.0), rng.uniform(0.75, 1.0), rng.uniform(0.0, 2.0) * area)
+
+
+def _logistic(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        rng.uniform(0.16, 0.21),
+        rng.uniform(2.2, 3.0),
+        rng.uniform(0.85, 1.25),
+        rng.uniform(0.008, 0.014) / area,
+        rng.uniform(1300.0, 1900.0) * area,
+        rng.uniform(220.0, 400.0) * area,
+        rng.uniform(0.6e-4, 1.4e-4) / area,
+    )
+
+
+def _rational(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        rng.uniform(380.0, 500.0) * area,
+        rng.uniform(0.23, 0.29),
+        rng.uniform(1.2, 1.5),
+        rng.uniform(0.6, 1.0),
+        rng.uniform(0.25, 0.4),
+        rng.uniform(0.6, 1.4),
+        rng.uniform(5000.0, 8000.0) * area,
+        rng.uniform(0.008, 0.013),
+    )
+
+
+def draw_map(rng: np.random.Generator, area: float) -> Constants:
+    """Draw the knots of a map [N]: a smooth base with bumps of a few per cent."""
+    p = MAP_PRESSURE[0] + MAP_PRESSURE[1] * np.arange(MAP_SHAPE[0])[:, None]
+    e = MAP_STRAIN[0] + MAP_STRAIN[1] * np.arange(MAP_SHAPE[1])[None, :]
+    r = e / rng.uniform(0.27, 0.34)
+    shape = np.sign(p) * (np.abs(p) / 6.0) ** rng.uniform(1.05, 1.2)
+    base = shape * (np.maximum(1.0 - r, 0.0) ** rng.uniform(1.5, 1.9) + 0.02 * (1.0 - r))
+    base = base - rng.uniform(0.16, 0.24) * (1.0 - np.exp(-9.0 * r))
+    bumps = rng.normal(size=MAP_SHAPE)
+    for axis in (0, 1):
+        bumps = 0.5 * bumps + 0.25 * (np.roll(bumps, 1, axis) + np.roll(bumps, -1, axis))
+    bumps *= np.clip(p / 3.0, 0.0, 1.0) / bumps.std()
+    size = rng.uniform(0.008, 0.014)
+    while True:
+        knots = base + size * bumps
+        if np.diff(knots[1:, :12], axis=0).min() > 0.002 and np.diff(knots, axis=1).max() < -1e-4:
+            break
+        size *= 0.8
+        if size < 1e-4:
+            knots = base
+            break
+    top = rng.uniform(380.0, 500.0) * area
+    return tuple((top * knots).ravel().tolist())
+
+
+_DRAWS: dict[str, Callable[[np.random.Generator, float], Constants]] = {
+    "exponential": _exponential,
+    "polynomial": _polynomial,
+    "sine": _sine,
+    "bundle": _bundle,
+    "braid": _braid,
+    "tangent": _tangent,
+    "sarosi": _sarosi,
+    "logistic": _logistic,
+    "rational": _rational,
+}
+
+
+def draw_law(name: str, rng: np.random.Generator, area: float) -> tuple[Constants, Constants]:
+    """Draw 16 constants of a law and its map (empty for most); `area` is relative to 10 mm."""
+    if name == "map":
+        return (0.0,) * 16, draw_map(rng, area)
+    constants = tuple(float(value) for value in _DRAWS[name](rng, area))
+    return constants + (0.0,) * (16 - len(constants)), ()

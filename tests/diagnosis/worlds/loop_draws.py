@@ -1,0 +1,130 @@
+"""Draws of hysteresis operators, of the normal loop and of the loops that effects bring in."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .loops import LOOPS, SIZE
+
+Operator = tuple[int, tuple[float, ...]]
+"""Kind and flattened constants."""
+
+
+def _pack(kind: str, thresholds: np.ndarray, shares: np.ndarray, others: np.ndarray) -> Operator:
+    op = np.zeros((3, SIZE))
+    op[0] = 1.0
+    op[0, : thresholds.size] = thresholds
+    op[1, : shares.size] = shares
+    op[2, : others.size] = others
+    return LOOPS.index(kind), tuple(op.ravel().tolist())
+
+
+def stops(thresholds: np.ndarray, shares: np.ndarray, half: float) -> Operator:
+    """Return parallel stops; in pressure the slope after a reversal stays positive."""
+    shares = shares / shares.sum()
+    steep = half * np.sum(shares / thresholds)
+    if half > 0.0 and steep > 0.92:
+        thresholds = thresholds * steep / 0.92
+    return _pack("stops", thresholds, shares, np.zeros(0))
+
+
+def geometric_stops(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw thresholds in geometric steps, most of the width in the middle ones."""
+    count = int(rng.integers(4, 8))
+    thresholds = np.geomspace(0.35, rng.uniform(2.0, 3.5), count) * half
+    return stops(thresholds, rng.dirichlet(np.full(count, 3.0)) + 0.02, half)
+
+
+def wide_stops(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw evenly spread thresholds up to several half widths: soft inner loops."""
+    thresholds = np.linspace(0.3, rng.uniform(3.0, 5.0), 10) * half
+    return stops(thresholds, np.exp(-thresholds / half / rng.uniform(1.5, 4.0)), half)
+
+
+def bouc_wen(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw a Bouc-Wen loop in pressure, a little lopsided."""
+    others = np.array([rng.uniform(1.0, 2.0), rng.uniform(0.5, 0.65), rng.uniform(0.0, 0.15)])
+    return _pack("bouc_wen", np.array([half * rng.uniform(1.5, 2.3)]), np.ones(1), others)
+
+
+def preisach(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw plays with outputs that bend with the level: a density skewed in its plane."""
+    thresholds = np.linspace(0.1, 2.3, SIZE)
+    peak, spread = rng.uniform(0.5, 0.9), rng.uniform(0.45, 0.7)
+    shares = np.exp(-0.5 * (np.log(thresholds / peak) / spread) ** 2)
+    shares /= shares.sum()
+    thresholds = thresholds * half / np.sum(shares * thresholds)
+    skew = rng.choice([-1.0, 1.0]) * rng.uniform(0.15, 0.35) * np.linspace(-1.0, 1.0, SIZE)
+    skew -= np.sum(shares * skew)
+    return _pack("preisach", thresholds, shares / half, skew)
+
+
+def skewed_play(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw plays with rising and falling edges that change with pressure differently."""
+    count = int(rng.integers(3, 7))
+    thresholds = np.linspace(0.5, 2.2, count)
+    shares = 0.92 * rng.dirichlet(np.full(count, 4.0))
+    thresholds = thresholds * half / np.sum(shares * thresholds)
+    edges = np.array([rng.uniform(0.1, 0.45), rng.uniform(-0.35, 0.1)])
+    return _pack("skewed_play", thresholds, shares / half, edges)
+
+
+def maxwell_slip(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw sliders that break away after a few parts of the length [mm]."""
+    breaks = np.array([0.003, 0.008, 0.02, 0.04]) * length * rng.uniform(0.7, 1.3)
+    return stops(breaks, np.array([0.25, 0.2, 0.15, 0.4]) * rng.uniform(0.7, 1.3, 4), 0.0)
+
+
+def end_slip(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw two groups of sliders: braid at the ends (soft) and in the middle (stiff)."""
+    breaks = np.array([0.002, 0.003, 0.005, 0.03, 0.06]) * length * rng.uniform(0.8, 1.2)
+    return stops(breaks, np.array([0.2, 0.2, 0.15, 0.25, 0.2]), 0.0)
+
+
+def dahl(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw a Dahl loop in length."""
+    reach = np.array([length * rng.uniform(0.004, 0.012)])
+    return _pack("dahl", reach, np.ones(1), np.array([rng.uniform(0.8, 1.6)]))
+
+
+def lugre(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw LuGre friction with a breakaway little above the kinetic force."""
+    reach = np.array([length * rng.uniform(0.003, 0.008)])
+    others = np.array([rng.uniform(0.02, 0.08), rng.uniform(3.0, 10.0)])
+    return _pack("lugre", reach, np.ones(1), others)
+
+
+def bouc_wen_length(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw a Bouc-Wen loop in length."""
+    others = np.array([rng.uniform(0.9, 1.6), rng.uniform(0.5, 0.7), rng.uniform(0.0, 0.1)])
+    reach = np.array([length * rng.uniform(0.008, 0.025)])
+    return _pack("bouc_wen", reach, np.ones(1), others)
+
+
+def backlash(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw one threshold: inner loops as wide as the outer one."""
+    reach = half * 1.09 if length == 0.0 else length * rng.uniform(0.001, 0.0025)
+    return stops(np.array([reach]), np.ones(1), half if length == 0.0 else 0.0)
+
+
+def blunt(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw a loop that opens over a long way: inner loops nearly closed."""
+    reach = half * rng.uniform(3.0, 5.0) if length == 0.0 else length * rng.uniform(0.04, 0.07)
+    others = np.array([rng.uniform(0.8, 1.2), 0.55, 0.0])
+    return _pack("bouc_wen", np.array([reach]), np.ones(1), others)
+
+
+DRAWS: dict[str, Callable[[np.random.Generator, float, float], Operator]] = {
+    "geometric_stops": geometric_stops,
+    "wide_stops": wide_stops,
+    "bouc_wen": bouc_wen,
+    "preisach": preisach,
+    "skewed_play": skewed_play,
+    "maxwell_slip": maxwell_slip,
+    "end_slip": end_slip,
+    "dahl": dahl,
+    "lugre": lugre,
+    "bouc_wen_length": bouc_wen_length,
+    "backlash": backlash,
+    "blunt": blunt,
+}

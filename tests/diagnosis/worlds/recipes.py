@@ -1,0 +1,118 @@
+"""The ten worlds: which law, loop and regulator each has, and how its regulator is drawn."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .names import WORLDS
+from .valve import KEYS, VALVES
+
+Draw = Callable[[np.random.Generator], dict[str, float]]
+
+
+def _lag(rng: np.random.Generator) -> dict[str, float]:
+    return {"lag_s": rng.uniform(0.04, 0.12)}
+
+
+def _overdamped(rng: np.random.Generator) -> dict[str, float]:
+    return {"frequency_rad_s": rng.uniform(18.0, 35.0), "damping": rng.uniform(1.0, 1.5)}
+
+
+def _underdamped(rng: np.random.Generator) -> dict[str, float]:
+    return {"frequency_rad_s": rng.uniform(14.0, 28.0), "damping": rng.uniform(0.42, 0.7)}
+
+
+def _limits(rng: np.random.Generator, low: float, high: float) -> dict[str, float]:
+    rate = rng.uniform(low, high)
+    vent = rate * rng.uniform(0.8, 1.2)
+    return {"fill_limit_s_bar": 1.0 / rate, "vent_limit_s_bar": 1.0 / vent}
+
+
+def _lag_limited(rng: np.random.Generator) -> dict[str, float]:
+    return {"lag_s": rng.uniform(0.03, 0.08)} | _limits(rng, 4.0, 8.0)
+
+
+def _delayed(rng: np.random.Generator) -> dict[str, float]:
+    return _lag(rng) | {"dead_time_s": rng.uniform(0.02, 0.06)}
+
+
+def _orifice(rng: np.random.Generator) -> dict[str, float]:
+    fill = rng.uniform(9.0, 18.0)
+    return {
+        "fill_bar_s": fill,
+        "vent_bar_s": fill * rng.uniform(0.9, 1.6),
+        "opening_bar": rng.uniform(0.35, 0.7),
+        "spool_s": rng.uniform(0.006, 0.015),
+    }
+
+
+def _orifice_delayed(rng: np.random.Generator) -> dict[str, float]:
+    delay = rng.uniform(0.01, 0.025) if rng.random() < 0.5 else 0.0
+    return _orifice(rng) | {"dead_time_s": delay}
+
+
+def _overdamped_delayed(rng: np.random.Generator) -> dict[str, float]:
+    return _overdamped(rng) | {"dead_time_s": rng.uniform(0.012, 0.03)}
+
+
+def _everything(rng: np.random.Generator) -> dict[str, float]:
+    return _delayed(rng) | _limits(rng, 5.0, 10.0)
+
+
+def _slow_tail(rng: np.random.Generator) -> dict[str, float]:
+    return _lag(rng) | {"slow_share": rng.uniform(0.03, 0.09), "slow_s": rng.uniform(0.5, 1.0)}
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Kinds of law, loop and regulator of a world."""
+
+    law: str
+    loop: str
+    drive: str  # "pressure" or "length"
+    valve: str
+    draw_valve: Draw
+    growth: tuple[float, float] = (0.0, 0.0)  # of slip force with pressure, per 3 bar
+    width: float = 1.0  # scale of the loop, so that those that open slowly are as wide
+
+    def valve_vector(self, rng: np.random.Generator) -> tuple[float, ...]:
+        """Draw the constants of the regulator, in the order of `KEYS`."""
+        values = dict.fromkeys(KEYS, 0.0) | {"supply_bar": rng.uniform(6.6, 7.6)}
+        values |= {"lag_s": 0.06, "slow_s": 1.0, "opening_bar": 0.5, "spool_s": 0.01}
+        values |= self.draw_valve(rng)
+        values["gain"] = rng.uniform(0.98, 1.02)
+        values["offset_bar"] = rng.uniform(-0.03, 0.03)
+        return tuple(float(values[key]) for key in KEYS)
+
+    @property
+    def valve_kind(self) -> int:
+        """Number of the regulator's kind."""
+        return VALVES.index(self.valve)
+
+
+RECIPES: dict[str, Recipe] = dict(
+    zip(
+        WORLDS,
+        (
+            Recipe("exponential", "geometric_stops", "pressure", "lag", _lag),
+            Recipe("polynomial", "bouc_wen", "pressure", "second_order", _overdamped),
+            Recipe("sine", "maxwell_slip", "length", "lag", _lag_limited, (0.3, 0.55), 1.55),
+            Recipe("map", "preisach", "pressure", "lag", _delayed),
+            Recipe("bundle", "dahl", "length", "orifice", _orifice, (0.1, 0.35), 1.15),
+            Recipe("braid", "lugre", "length", "orifice", _orifice_delayed, (0.0, 0.3), 0.85),
+            Recipe("tangent", "wide_stops", "pressure", "second_order", _underdamped),
+            Recipe(
+                "sarosi",
+                "bouc_wen_length",
+                "length",
+                "second_order",
+                _overdamped_delayed,
+                (0.0, 0.3),
+            ),
+            Recipe("logistic", "skewed_play", "pressure", "lag", _everything),
+            Recipe("rational", "end_slip", "length", "slow_tail", _slow_tail, (0.15, 0.4), 1.75),
+        ),
+        strict=True,
+    )
+)

@@ -1,0 +1,59 @@
+"""One step of a pressure regulator: its rate of pressure before limits and leaks."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+VALVES = ("lag", "second_order", "orifice", "slow_tail")
+KEYS = (
+    "gain",
+    "offset_bar",
+    "dead_time_s",
+    "fill_limit_s_bar",
+    "vent_limit_s_bar",
+    "lag_s",
+    "frequency_rad_s",
+    "damping",
+    "slow_share",
+    "slow_s",
+    "fill_bar_s",
+    "vent_bar_s",
+    "opening_bar",
+    "spool_s",
+    "supply_bar",
+)
+"""Constants of a valve, in the order of its vector; limits are reciprocal rates, 0 for none."""
+AMBIENT = 1.013  # [bar]
+CRITICAL = 0.3
+
+
+@njit(cache=True)
+def flow(upstream: float, downstream: float) -> float:
+    """Return the flow through an orifice relative to the choked one at 7 bar absolute."""
+    if upstream <= downstream:
+        return 0.0
+    ratio = (downstream / upstream - CRITICAL) / (1.0 - CRITICAL)
+    if ratio <= 0.0:
+        return upstream / 7.0
+    return upstream / 7.0 * math.sqrt(max(1.0 - ratio * ratio, 0.0))
+
+
+@njit(cache=True)
+def valve_rate(
+    kind: int, c: np.ndarray, p: float, state: np.ndarray, target: float, supply: float, dt: float
+) -> float:
+    """Return the rate of pressure [bar/s]; the state is rate, slow part, spool."""
+    if kind == 1:
+        pull = c[6] * c[6] * (target - p) - 2.0 * c[7] * c[6] * state[0]
+        return state[0] + dt * pull
+    if kind == 2:
+        wanted = min(max((target - p) / c[12], -1.0), 1.0)
+        state[2] += dt / c[13] * (wanted - state[2])
+        if state[2] >= 0.0:
+            return state[2] * c[10] * flow(supply + AMBIENT, p + AMBIENT)
+        return state[2] * c[11] * flow(p + AMBIENT, AMBIENT)
+    if kind == 3:
+        state[1] += dt / c[9] * (target - state[1])
+        return ((1.0 - c[8]) * target + c[8] * state[1] - p) / c[5]
+    return (target - p) / c[5]
