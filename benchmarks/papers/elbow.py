@@ -8,18 +8,16 @@ for comparison only. Hysteresis and sign change are inputs and therefore not jud
 """
 
 import dataclasses
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from benchmarks.papers.published import BEFORE, Figure, Group, as_published, note
+from benchmarks.papers.published import Group, Values, as_published
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.muscle.quadratic_bundle import QuadraticBundle
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.pneumatics.on_off_pair import OnOffValve, filled
 
-SOURCE = "chakarov2018"
 FULL = 6e5
 """Highest pressure [Pa]."""
 DEGREES = (0.0, 60.0, 120.0)
@@ -63,47 +61,34 @@ def printed_bundle(muscles: int) -> QuadraticBundle:
     return dataclasses.replace(bundle(muscles, 0.33), pressure_base=-0.021)
 
 
-CHAIN, FORCES = (13, 14, 15, 19, 20, 21, 22), (11, 12, 16, 17, 18, 23)
-"""Equations that the derivative of the torque, and the round trip of the pressures, test."""
 ENDS = ((np.array([0.0, FULL]), 3e5), (3e5, np.array([0.0, FULL])))
-ORDER = "both pressures enter both equations, which are solved together"
-CORNER = "not in the paper; the independent program's value is 1.6 % off from the same equations"
-MISPRINT = "the bundle would push; -0.21 + 4.41 mus is read, with the slope of a braid of 16 mm"
 
 
-def stroke() -> Iterator[Figure]:
+def stroke() -> Values:
     """Stroke of the pulley, in length and as a share of the muscles."""
-    plant, where = orthosis(), f"{SOURCE}, section 3: pre-tensioning; Eq. (10)"
+    plant = orthosis()
     length = plant.pulley.stroke
-    share = 100.0 * length / plant.bundle_a.nominal_length
-    yield Figure("sum of the contractions", length, "m", where, 0.066, 5e-5, "predicted")
-    where = f"{SOURCE}, section 3: pre-tensioning; Eq. (3)"
-    yield Figure("the same over the length", share, "%", where, 16.9, 0.05, "predicted")
+    yield "sum of the contractions", length
+    yield "the same over the length", 100.0 * length / plant.bundle_a.nominal_length
     low, high = plant.angle_range
     contracted = float(plant.pulley.contractions(high)[0]), float(plant.pulley.contractions(low)[1])
-    where, words = f"{SOURCE}, Eq. (8); Eq. (9)", "one bundle has zero contraction"
-    name = "contraction of the stretched bundle at the ends"
-    yield Figure(name, max(map(abs, contracted)), "m", where, at_most=1e-12, claim=words)
+    yield "contraction of the stretched bundle at the ends", max(map(abs, contracted))
 
 
-def torque_table() -> Iterator[Figure]:
+def torque_table() -> Values:
     """Torque and stiffness at the corners of the pressures, and where full pressures balance."""
     plant, q = orthosis(), np.radians(DEGREES)
-    tag = note("predicted", "k1 read as -0.21 + 4.41 mus", BEFORE)
-    turning = f"{SOURCE}, Fig. 6; Eq. (23)"
-    stiff = f"{SOURCE}, Fig. 6; Eq. (22); section 3: position-dependent stiffness"
-    for name, unit, table, law, tolerance, where in (
-        ("torque", "N m", TORQUES, plant.torque, 0.02, turning),
-        ("stiffness", "N m/rad", STIFFNESSES, plant.stiffness, 5e-3, stiff),
+    title = "{label} kPa and {degrees:g} degrees"
+    for name, table, law in (
+        ("torque", TORQUES, plant.torque),
+        ("stiffness", STIFFNESSES, plant.stiffness),
     ):
         for pressures, values in table.items():
             label = "/".join(f"{1e-3 * p:g}" for p in pressures)
             for degrees, value, ours in zip(DEGREES, values, law(q, *pressures), strict=True):
-                title = f"{name} at {label} kPa and {degrees:g} degrees"
-                more: dict[str, Any] = {"tolerance": tolerance, "note": tag, "expected": value}
-                yield Figure(title, float(ours), unit, where, **more)
-    title, where = "angle at which 600/600 kPa balance", f"{SOURCE}, Fig. 6; Eq. (23)"
-    yield Figure(title, balance(plant), "degrees", where, note=tag, expected=107.0, tolerance=0.5)
+                at = {"label": label, "degrees": degrees, "expected": value}
+                yield f"{name} at {title}", float(ours), at
+    yield "angle at which 600/600 kPa balance", balance(plant)
 
 
 def balance(plant: ElbowOrthosis) -> float:
@@ -112,54 +97,34 @@ def balance(plant: ElbowOrthosis) -> float:
     return float(np.degrees(fine[np.argmin(np.abs(plant.torque(fine, FULL, FULL)))]))
 
 
-def exactness() -> Iterator[Figure]:
+def exactness() -> Values:
     """Stiffness against finite differences, sign of the determinant, round trip of allocation."""
     plant, h, q = orthosis(), 1e-4, np.radians(np.linspace(0.0, 120.0, 121))
-    tag = note("predicted", "on the law that is not clipped")
     worst = 0.0
     for p in ((0.0, 0.0), (FULL, 0.0), (0.0, FULL), (FULL, FULL)):
         slope = (plant.torque(q + h, *p) - plant.torque(q - h, *p)) / (2.0 * h)
         worst = max(worst, float(np.abs(slope + plant.stiffness(q, *p)).max()))
+    yield "stiffness less finite difference", worst
     positive = 100.0 * float(np.mean(plant.determinant(q) > 0.0))
+    yield "angles with a positive determinant", positive
     drawn = np.random.default_rng(0).uniform(0.0, FULL, (2, len(q)))
     made = plant.allocate(q, plant.torque(q, *drawn), plant.stiffness(q, *drawn))
-    trip = float(np.abs(np.array(made) - drawn).max()) / FULL
-    title = "stiffness less finite difference"
-    where, words = f"{SOURCE}, {'; '.join(f'Eq. ({n})' for n in CHAIN)}", "K_q = r2 [k_a + k_b]"
-    yield Figure(title, worst, "N m/rad", where, note=tag, at_most=1e-6, claim=words)
-    title, words = "angles with a positive determinant", "parallel control"
-    where = f"{SOURCE}, section 3: torque and stiffness in parallel"
-    yield Figure(title, positive, "%", where, note=tag, at_least=100.0, claim=words)
-    where, words = f"{SOURCE}, {'; '.join(f'Eq. ({n})' for n in FORCES)}", "Q = (P_b - P_a) r"
-    title = "round trip of the pressures"
-    yield Figure(title, trip, "of full", where, note=tag, at_most=1e-9, claim=words)
-    where = f"{SOURCE}, section 3: order of the pressures"
-    words = "is set to achieve the desired stiffness"
-    either: dict[str, Any] = {"at_most": 0.01, "why": ORDER, "note": tag}
-    title = "share of bundle b in the change of stiffness, 60 degrees"
+    yield "round trip of the pressures", float(np.abs(np.array(made) - drawn).max()) / FULL
     change = [float(abs(np.diff(plant.stiffness(q[60], *p))[0])) for p in ENDS]
-    yield Figure(title, change[1] / sum(change), "", where, claim=words, **either)
+    yield "share of bundle b in the change of stiffness, 60 degrees", change[1] / sum(change)
 
 
-def feasible_set() -> Iterator[Figure]:
+def feasible_set() -> Values:
     """Stiffness range without torque and area of the feasible set, with C_max = 0.33 and 0.28."""
-    wide, where = orthosis(0.33), f"{SOURCE}, Fig. 6; section 5: ranges"
-    tag = note("predicted", "C_max = 0.33 L_n", BEFORE)
+    wide = orthosis(0.33)
     for degrees, values in RANGES.items():
         ours = stiffness_range(wide, np.radians(degrees))
         for name, (value, rounded), made in zip(("softest", "stiffest"), values, ours, strict=True):
-            title = f"{name} without torque at {degrees:g} degrees"
-            ends: dict[str, Any] = {"tolerance": rounded, "expected": value, "why": CORNER}
-            yield Figure(title, made, "N m/rad", where, note=tag, **ends)
-    areas: tuple[tuple[float, dict[str, Any]], ...] = (
-        (0.33, {"expected": 138.0, "tolerance": 1.5}),
-        (0.28, {}),
-    )
-    for share, known in areas:
-        tag = note("predicted", f"C_max = {share:g} L_n, at 60 degrees", BEFORE)
-        area = feasible_area(orthosis(share), np.radians(60.0))
-        title = "area of torque and stiffness within reach"
-        yield Figure(title, area, "N2 m2/rad", where, note=tag, **known)
+            known = {"degrees": degrees, "expected": value, "tolerance": rounded}
+            yield f"{name} without torque at {{degrees:g}} degrees", made, known
+    for share in ("0.33", "0.28"):
+        area = feasible_area(orthosis(float(share)), np.radians(60.0))
+        yield f"area of torque and stiffness within reach, C_max = {share} L_n", area
 
 
 def stiffness_range(plant: ElbowOrthosis, angle: float) -> tuple[float, float]:
@@ -178,36 +143,26 @@ def feasible_area(plant: ElbowOrthosis, angle: float) -> float:
     return float(side[3] * up[1] - side[1] * up[3])
 
 
-def force_law() -> Iterator[Figure]:
+def force_law() -> Values:
     """Force of bundles with k1 as printed and as read, and where filling changes its sign."""
-    for reading, table, make, where in (
-        ("as printed", PRINTED, printed_bundle, f"{SOURCE}, Eq. (6)"),
-        ("as read", READ, lambda n: bundle(n, 0.33), f"{SOURCE}, Eq. (6); Fig. 4"),
+    for reading, table, make in (
+        ("as printed", PRINTED, printed_bundle),
+        ("as read", READ, lambda n: bundle(n, 0.33)),
     ):
-        tag = note("predicted", f"k1 {reading}, C_max = 0.33 L_n, law not clipped", BEFORE)
         for n, value in table.items():
-            name = f"force of {n} at 400 kPa and nominal length, k1 {reading}"
-            ours = float(make(n).law(4e5, 0.0))
-            yield Figure(name, ours, "N", where, note=tag, expected=value, tolerance=0.5)
-    where, words = f"{SOURCE}, Eq. (6)", "pulling force"
-    name = "sign of the force of 1 at 400 kPa, k1 as printed"
+            name = f"force of {{n}} at 400 kPa and nominal length, k1 {reading}"
+            yield name, float(make(n).law(4e5, 0.0)), {"n": n, "expected": value}
     ours = float(printed_bundle(1).law(4e5, 0.0))
-    yield Figure(name, ours, "N", where, at_least=0.0, claim=words, why=MISPRINT)
-    one, drawn = bundle(1), f"{SOURCE}, Fig. 2"
-    tag = note("predicted", "C_max = 0.28 L_n, law not clipped", BEFORE)
+    yield "sign of the force of 1 at 400 kPa, k1 as printed", ours
+    one = bundle(1)
     for share, value in FIG_2.items():
-        name = f"force of one muscle at 500 kPa and {share:g} %"
         ours = float(one.law(5e5, 0.01 * share * one.nominal_length))
-        yield Figure(name, ours, "N", drawn, note=tag, expected=value, tolerance=0.05)
-    tag = note("an input (C_max)", "where filling to 500 kPa leaves the force as it is")
-    name, change = "contraction of the sign change", 100.0 * sign_change(one)
-    yield Figure(name, change, "%", drawn, 28.0, note=tag, given=True)
+        known = {"share_of_length": share, "expected": value}
+        yield "force of one muscle at 500 kPa and {share_of_length:g} %", ours, known
+    yield "contraction of the sign change", 100.0 * sign_change(one)
     cosine = np.sqrt(1.0 / 3.0) / (1.0 - one.largest_contraction)
     area = 0.25 * np.pi * one.diameter**2 * (3.0 * cosine**2 - 1.0)
-    ideal = 1e3 * area / (one.nominal_length * one.reach)
-    tag = note("predicted", "braid whose force ends at 28 %, against 4.41 of Eq. (6)", BEFORE)
-    more: dict[str, Any] = {"note": tag, "expected": 4.39, "tolerance": 5e-3}
-    yield Figure("k1 of an ideal braid", ideal, "N/(m2 kPa)", where, **more)
+    yield "k1 of an ideal braid", 1e3 * area / (one.nominal_length * one.reach)
 
 
 def sign_change(muscles: QuadraticBundle) -> float:
@@ -217,16 +172,13 @@ def sign_change(muscles: QuadraticBundle) -> float:
     return float(shares[np.argmin(np.abs(muscles.law(5e5, c) - muscles.law(0.0, c)))])
 
 
-def hysteresis() -> Iterator[Figure]:
+def hysteresis() -> Values:
     """Largest difference of loading and unloading over the force at nominal length."""
     for kind in ("maxwell_slip", "preisach"):
         plant = as_published(ElbowOrthosis.paper(kind))
         for pressure in (0.0, 5e5):
-            tag = note("an input (loop)", f"hysteresis {kind}, whole stroke of the orthosis")
-            ours = 100.0 * loop_share(plant, pressure)
-            name = f"hysteresis at {1e-3 * pressure:g} kPa"
-            where = f"{SOURCE}, section 2: hysteresis; Fig. 3"
-            yield Figure(name, ours, "%", where, 7.5, note=tag, given=True)
+            at = {"kpa": 1e-3 * pressure, "kind": kind}
+            yield "hysteresis at {kpa:g} kPa, {kind}", 100.0 * loop_share(plant, pressure), at
 
 
 def loop_share(plant: Any, pressure: float) -> float:
@@ -242,13 +194,12 @@ def loop_share(plant: Any, pressure: float) -> float:
     return float(np.max(force[201:][::-1] - force[:201])) / float(muscles.law(pressure, 0.0))
 
 
-def small_motions() -> Iterator[Figure]:
+def small_motions() -> Values:
     """Stiffness over one degree, with sticking threads, beside that of the force law."""
-    tag = note("predicted", "from the angle of the last turn", "the law's is with no hysteresis")
     for kind in ("none", "maxwell_slip", "preisach"):
-        name = f"stiffness over a degree at 200 kPa and 57 degrees, hysteresis {kind}"
         ours = stiffness_of_a_degree(kind, 2e5, np.radians(57.0))
-        yield Figure(name, ours, "N m/rad", f"{SOURCE}, Eq. (22)", note=tag)
+        name = "stiffness over a degree at 200 kPa and 57 degrees, hysteresis {kind}"
+        yield name, ours, {"kind": kind}
 
 
 def stiffness_of_a_degree(kind: Any, pressure: float, angle: float) -> float:
@@ -267,20 +218,15 @@ def stiffness_of_a_degree(kind: Any, pressure: float, angle: float) -> float:
     return float((torque[-2] - torque[-1]) / (q[-1] - q[-2]))
 
 
-def filling() -> Iterator[Figure]:
+def filling() -> Values:
     """Time to fill bundles through the valve named in the paper."""
-    tag, times = note("predicted", "the figure's axis ends at 2 s"), list[float]()
-    for share in (8.0, 24.0):
-        ours = time_to_pressure(bundle(1), 0.01 * share, 5e5, 4.5e5)
-        name = f"time to 90 % of the force at 500 kPa and {share:g} %"
-        times.append(ours)
-        yield Figure(name, ours, "s", f"{SOURCE}, Fig. 2", note=tag)
-    name, where = "the same at 24 % over 8 %", f"{SOURCE}, section 2: response time"
-    yield Figure(name, times[1] / times[0], "", where, at_least=1.0, claim="higher")
+    times = [time_to_pressure(bundle(1), 0.01 * share, 5e5, 4.5e5) for share in (8.0, 24.0)]
+    yield "time to 90 % of the force at 500 kPa and 8 %", times[0]
+    yield "time to 90 % of the force at 500 kPa and 24 %", times[1]
+    yield "the same at 24 % over 8 %", times[1] / times[0]
     for n in (3, 7):
         ours = time_to_pressure(bundle(n), 0.084, FULL, 3e5)
-        name = f"time from 0 to 300 kPa of {n} muscles, half-way in the stroke"
-        yield Figure(name, ours, "s", f"{SOURCE}, section 4: valves", note="predicted")
+        yield "time from 0 to 300 kPa of {n} muscles, half-way in the stroke", ours, {"n": n}
 
 
 def time_to_pressure(muscles: QuadraticBundle, share: float, supply: float, target: float) -> float:

@@ -13,7 +13,7 @@ from benchmarks.papers import (
     manipulator,
     positioning,
 )
-from benchmarks.papers.published import Figure, Group
+from benchmarks.papers.published import Figure, Group, compared
 
 BY_PAPER: dict[str, tuple[Group, ...]] = {
     "yeh2010": (*equations.KNEE_GROUPS, *knee.GROUPS, *gait.GROUPS, *knee_envs.GROUPS),
@@ -40,7 +40,7 @@ def all_figures(papers: Sequence[str] = (), places: Sequence[str] = ()) -> list[
     for paper in papers or BY_PAPER:
         for group in BY_PAPER[paper]:
             try:
-                figures += group()
+                figures += compared(paper, group)
             except (ModuleNotFoundError, AttributeError) as error:
                 title = (group.__doc__ or group.__name__).splitlines()[0].rstrip(".")
                 figures.append(Figure(title, None, note=f"not there: {error}"))

@@ -1,29 +1,24 @@
 """Figures of positioning2021: loop widths, simulated loops and positioning errors."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from baselines.positioning.contraction_tables import positioning_error_table
-from benchmarks.papers.published import BEFORE, Figure, Group, as_published
+from benchmarks.papers.published import Group, Values, as_published
 from benchmarks.scenarios.scenario_env import make_env
 from pam_envs.arrays import Array
 from pam_envs.data.tables import load_contraction_table
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-SOURCE = "positioning2021"
 MM, BAR = 1e3, 1e-5
+HOLD_SECONDS = 3.0  # time at each pressure of a quasi-static loop
 
 WIDTHS: dict[float, tuple[float, float]] = {0.0: (3.29, 3.5), 2.55: (2.82, 4.5), 4.55: (2.40, 3.5)}
 """Load [kg]: largest loop width [mm] and the pressure of it [bar]."""
 PLACES = {
-    0.0: f"{SOURCE}, Fig. 4; section 3.1.1: widest loop; section 4: inflation and deflation",
-    2.55: f"{SOURCE}, Fig. 7; section 3.1.2: widest loop; section 4: inflation and deflation",
-    4.55: f"{SOURCE}, Fig. 9; section 3.1.3: widest loop; section 4: inflation and deflation",
+    0.0: "Fig. 4; section 3.1.1: widest loop; section 4: inflation and deflation",
+    2.55: "Fig. 7; section 3.1.2: widest loop; section 4: inflation and deflation",
+    4.55: "Fig. 9; section 3.1.3: widest loop; section 4: inflation and deflation",
 }
-
-SIMULATED = 0.3
-"""Tolerance [mm] of an identified plant's loop width where the measured loop is widest."""
 
 
 def loop_width(pressure: Array, contraction: Array) -> tuple[Array, Array]:
@@ -35,22 +30,21 @@ def loop_width(pressure: Array, contraction: Array) -> tuple[Array, Array]:
     return pressure[: n + 1], contraction[::-1][: n + 1] - contraction[: n + 1]
 
 
-def measured_widths() -> Iterator[Figure]:
+def measured_widths() -> Values:
     """Largest width of the mean loops in the tables."""
     table = load_contraction_table()
     for load, (width, where) in WIDTHS.items():
         pressure, widths = loop_width(*table.means(load))
-        best = int(np.argmax(widths))
-        name = f"tables, {load:g} kg: largest loop width"
-        ours = (MM * float(widths[best]), BAR * float(pressure[best]))
-        yield Figure(name, ours[0], "mm", PLACES[load], width, 0.005)
-        yield Figure(f"{name}, at", ours[1], "bar", PLACES[load], where, 1e-6)
+        best, at = int(np.argmax(widths)), {"load": load, "source": PLACES[load]}
+        name = "tables, {load:g} kg: largest loop width"
+        yield name, MM * float(widths[best]), at | {"published": width}
+        yield f"{name}, at", BAR * float(pressure[best]), at | {"published": where}
 
 
-def simulated_loop(hysteresis: str, load: float, hold_seconds: float = 3.0) -> tuple[Array, Array]:
+def simulated_loop(hysteresis: str, load: float) -> tuple[Array, Array]:
     """Return the quasi-static loop of an identified plant, 0 to 6 bar and back by half a bar.
 
-    Pressures [Pa] and noise-free contractions [m], shape (25,), at the end of each hold [s].
+    Pressures [Pa] and noise-free contractions [m], shape (25,), at the end of each hold.
     """
     up = np.arange(0.0, 6.01e5, 0.5e5)
     path = np.concatenate([up, up[-2::-1]])
@@ -59,27 +53,27 @@ def simulated_loop(hysteresis: str, load: float, hold_seconds: float = 3.0) -> t
         "load": load,
         "start": "rest",
         "normalize": False,
-        "episode_seconds": len(path) * hold_seconds + 1.0,
+        "episode_seconds": len(path) * HOLD_SECONDS + 1.0,
     }
     env = make_env("PAM/MusclePositioning-v0", kwargs)
     env.reset(seed=0)
     outputs = []
     for pressure in path:
-        for _ in range(round(hold_seconds / 0.01)):
+        for _ in range(round(HOLD_SECONDS / 0.01)):
             info = env.step(np.array([pressure]))[4]
         outputs.append(info["output"])
     env.close()
     return path, np.array(outputs)
 
 
-def simulated_widths() -> Iterator[Figure]:
+def simulated_widths() -> Values:
     """Loop width of the simulated plants where the measured loop is widest."""
     for hysteresis in ("maxwell_slip", "preisach"):
         for load, (width, where) in WIDTHS.items():
             pressure, widths = loop_width(*simulated_loop(hysteresis, load))
             ours = MM * float(np.interp(where, BAR * pressure, widths))
-            name = f"{hysteresis} plant, {load:g} kg: loop width at {where:g} bar"
-            yield Figure(name, ours, "mm", PLACES[load], width, SIMULATED)
+            at = {"load": load, "bar": where, "source": PLACES[load], "published": width}
+            yield f"{hysteresis} plant, {{load:g}} kg: loop width at {{bar:g}} bar", ours, at
 
 
 POSITIONING: dict[str, tuple[float, float]] = {
@@ -95,27 +89,18 @@ POSITIONING: dict[str, tuple[float, float]] = {
 from the paper's tables by an independent program."""
 
 
-def positioning_errors() -> Iterator[Figure]:
+def positioning_errors() -> Values:
     """Positioning error of the polynomials and their refits on the tables' own repeats."""
-    table, where = positioning_error_table(), f"{SOURCE}, abstract: positioning accuracy"
+    table = positioning_error_table()
     for name, (rms, largest) in POSITIONING.items():
-        ours = table[name]
-        for what, value, expected in (
-            ("RMS positioning error", ours.rms, rms),
-            ("largest error", ours.largest, largest),
-        ):
-            more = {"tolerance": 6e-4, "note": BEFORE, "expected": expected}
-            yield Figure(f"{name}: {what}", MM * value, "mm", where, **more)  # type: ignore[arg-type]
+        ours, about = table[name], {"curves": name}
+        yield "{curves}: RMS positioning error", MM * ours.rms, about | {"expected": rms}
+        yield "{curves}: largest error", MM * ours.largest, about | {"expected": largest}
     without = table["one cubic for both branches"].rms
-    ratio, words = table["published"].rms / without, "increase positioning accuracy"
     name = "Eqs. (7) to (12) over one cubic without hysteresis, RMS"
-    why = "Eq. (11) as printed: 4.0 mm RMS"
-    yield Figure(name, ratio, "", where, at_most=1.0, claim=words, why=why)
-    ratio = without / table["pchip"].rms
-    where = f"{SOURCE}, section 4: inverse model"
-    words = "hysteresis should be compensated"
+    yield name, table["published"].rms / without
     name = "RMS positioning error without hysteresis over that of an inverse"
-    yield Figure(name, ratio, "", where, at_least=1.0, claim=words)
+    yield name, without / table["pchip"].rms
 
 
 GROUPS: tuple[Group, ...] = (measured_widths, simulated_widths, positioning_errors)

@@ -1,8 +1,16 @@
-"""Published figures compared with ours, each with its tolerance."""
+"""Published figures compared with ours, each with its tolerance.
 
-from collections.abc import Callable, Iterable, Sequence
+``figures.yaml`` declares the figures of each paper: name, unit, place, printed value or claim,
+tolerance, and remarks. Groups compute our values.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar
+
+import yaml
 
 from pam_envs.plants.core.plant import Plant
 
@@ -116,8 +124,35 @@ class Figure:
         return {**asdict(self), "passed": self.passed, "verdict": self.verdict}
 
 
-Group = Callable[[], Iterable[Figure]]
+Values = Iterator[tuple[Any, ...]]
+"""Name of each declared figure, our value and, optionally, what completes the declaration: values
+of ``{}`` in its texts, and entries of :class:`Figure`."""
+Group = Callable[[], Values]
 """Computes some figures of a paper; its docstring is their title."""
+
+
+@cache
+def declared() -> dict[str, dict[str, Mapping[str, Any]]]:
+    """Return the declarations of ``figures.yaml`` by paper and name."""
+    text = Path(__file__).with_name("figures.yaml").read_text(encoding="utf-8")
+    return dict(yaml.safe_load(text))
+
+
+def compared(paper: str, group: Group) -> Iterator[Figure]:
+    """Yield the figures of a group; ``share`` of a declaration is a tolerance over the value."""
+    for name, ours, *more in group():
+        facts = {"independent": BEFORE, **(more[0] if more else {})}
+        known = {**declared()[paper][name], **{k: v for k, v in facts.items() if k in _FIELDS}}
+        made: dict[str, Any] = {
+            key: v.format(**facts) if isinstance(v, str) else v for key, v in known.items()
+        }
+        if (share := made.pop("share", None)) is not None:
+            made["tolerance"] = share * abs(made["expected"])
+        made["source"] = f"{paper}, {made['source']}"
+        yield Figure(name.format(**facts), ours, **made)
+
+
+_FIELDS = {*Figure.__dataclass_fields__} - {"name", "ours"}
 
 P = TypeVar("P", bound=Plant)
 
@@ -131,11 +166,6 @@ def as_published(plant: P) -> P:
     if plant.hysteresis.drive != "pressure":  # type: ignore[attr-defined]
         raise ValueError(f"the hysteresis of this {plant.family} is not driven by pressure")
     return plant.with_lag_alone()
-
-
-def note(*words: str) -> str:
-    """Return the note of a figure: calibrated or predicted, with which preset, in which norm."""
-    return "; ".join(words)
 
 
 def aligned(lines: Sequence[Sequence[str]]) -> str:

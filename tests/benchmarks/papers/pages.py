@@ -1,7 +1,19 @@
-"""Pages of the documentation, whose numbers the tests compute again."""
+"""Figures of a paper, and pages of the documentation, whose numbers the tests compute again."""
 
 import re
+from functools import cache
 from pathlib import Path
+
+from benchmarks.papers.figures import all_figures
+from benchmarks.papers.published import Figure
+
+
+@cache
+def figures_of(paper: str) -> dict[str, Figure]:
+    """Return the computed figures of a paper by their names, of which none is there twice."""
+    made = [figure for figure in all_figures([paper]) if figure.ours is not None]
+    assert len({figure.name for figure in made}) == len(made)
+    return {figure.name: figure for figure in made}
 
 
 class Page:

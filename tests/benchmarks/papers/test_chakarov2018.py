@@ -1,18 +1,15 @@
 """chakarov2018: figures of the elbow orthosis, known misses, and the documentation page."""
 
-from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from pages import Page
+from pages import Page, figures_of
 
 import pam_envs  # noqa: F401 (registers)
 from baselines.core.catalogue import make_controller
 from benchmarks.papers import elbow as figures
-from benchmarks.papers import figures as papers
-from benchmarks.papers.published import Figure
 from benchmarks.runs.rollout import run
 from tests.test_readme import run_snippets
 
@@ -20,34 +17,16 @@ PAGE, ENV_PAGE = Page("elbow_orthosis.md"), Page("envs/elbow_orthosis.md")
 row = PAGE.row
 
 
-MISSED = {
-    "softest without torque at 20 degrees",
-    "share of bundle b in the change of stiffness, 60 degrees",
-    "sign of the force of 1 at 400 kPa, k1 as printed",
-}
-"""The first one is not a figure of the paper's: 2.71 N m/rad against 2.75."""
-INPUTS = (figures.hysteresis, figures.small_motions)
-
-
-@pytest.mark.parametrize("group", figures.GROUPS, ids=lambda group: group.__name__)
-def test_only_the_listed_figures_miss(group: Callable[[], list[Figure]]) -> None:
-    made = list(group())
-    assert made
-    assert {f.name for f in made if f.verdict == "differs"} == MISSED & {f.name for f in made}
-    assert any(f.verdict == "reproduced" for f in made) != (group in INPUTS)
-    for figure in made:  # nothing but the paper's own figures is called published
+def test_nothing_but_the_own_figures_of_the_paper_is_called_published() -> None:
+    for figure in figures_of("chakarov2018").values():
         printed = "pre-tensioning" in figure.source
         assert (figure.published == figure.published) == (printed or "input" in figure.note)
 
 
 def test_tabulated_torques_are_judged_within_two_hundredths() -> None:
-    torques = [f for f in figures.torque_table() if f.unit == "N m"]
+    torques = [f for f in figures_of("chakarov2018").values() if f.unit == "N m"]
     assert len(torques) == 9
     assert all(f.passed and f.tolerance == 0.02 for f in torques)
-
-
-def test_elbow_figures_are_in_the_table_of_all_papers() -> None:
-    assert set(figures.GROUPS) <= set(papers.GROUPS)
 
 
 def test_tolerances_of_elbow_can_fail() -> None:
@@ -88,7 +67,7 @@ def test_force_law_as_printed_and_as_read_has_the_tabulated_values() -> None:
     forces = [float(one.law(5e5, 0.01 * s * one.nominal_length)) + 0.0 for s in shares]
     assert row("one muscle, 500 kPa") == [f"{f:.1f} N".replace("-0.0", "0.0") for f in forces]
     assert row("contraction") == [f"{s:g} %" for s in shares]
-    braid = list(figures.force_law())[-1].ours
+    braid = figures_of("chakarov2018")["k1 of an ideal braid"].ours
     assert f"that ends at 28 % has {braid:.2f} N/(m2 kPa)" in PAGE.flat
 
 
@@ -115,7 +94,7 @@ def test_feasible_stiffness_range() -> None:
         f"area is {areas[0]:.0f} N2 m2/rad with 0.33, and {areas[1]:.0f} with the 0.28" in PAGE.flat
     )
     assert 0.7 < areas[1] / areas[0] < 0.8  # a quarter less
-    difference, positive, trip, _ = (f.ours for f in figures.exactness())
+    difference, positive, trip, _ = (ours for _, ours in figures.exactness())
     assert difference < 1e-6
     assert positive == 100.0
     assert trip < 1e-9
@@ -142,6 +121,6 @@ def test_table_of_environment_page_is_approximate(name: str) -> None:
 
 
 def test_page_lists_the_missed_figure() -> None:
-    missed = [f for group in (figures.feasible_set, figures.force_law) for f in group()]
-    (miss,) = [f for f in missed if f.verdict == "differs" and f.expected is not None]
+    found = figures_of("chakarov2018").values()
+    (miss,) = [f for f in found if f.verdict == "differs" and f.expected is not None]
     assert row(miss.name)[:2] == ["2.75 N m/rad", f"{miss.ours:.2f} N m/rad"]

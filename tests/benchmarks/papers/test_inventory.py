@@ -3,13 +3,15 @@
 import re
 import shlex
 from collections import Counter
+from pathlib import Path
 
 import pytest
+import yaml
 from pages import Page
 
 from benchmarks.papers import figures as papers
 from benchmarks.papers import inventory
-from benchmarks.papers.published import VERDICTS, Figure
+from benchmarks.papers.published import VERDICTS, Figure, declared
 
 NUMBERS = {
     "yeh2010": {"figures": 17, "tables": 0, "equations": 13},
@@ -57,6 +59,23 @@ def test_item_without_a_computed_row_has_no_other_row(rows: list[Figure]) -> Non
 def test_every_verdict_has_a_reason(rows: list[Figure]) -> None:
     assert [row.name for row in rows if row.unexplained] == []
     assert {row.verdict for row in rows} == {*VERDICTS}
+
+
+def test_only_the_listed_figures_differ(rows: list[Figure]) -> None:
+    listed = yaml.safe_load(Path(__file__).with_name("differing.yaml").read_text())
+    found = {paper: [] for paper in listed}
+    for row in rows:
+        if row.verdict == "differs":
+            found[row.source.partition(", ")[0]].append(row.name)
+    assert found == listed
+
+
+def test_every_declared_figure_is_computed(rows: list[Figure]) -> None:
+    for paper, names in declared().items():
+        there = [row.name for row in rows if row.source.startswith(f"{paper}, ")]
+        for name in names:
+            pattern = ".*".join(map(re.escape, re.split(r"\{[^}]*\}", name)))
+            assert any(re.fullmatch(pattern, one) for one in there), name
 
 
 def test_selection_by_place_has_its_rows_only() -> None:
