@@ -220,10 +220,11 @@ class BundleRegulator(RegulatorEffects):
 AIR = parameter_rows(RegulatorEffects)
 """Rows of the effects of valve, supply and line, from the first."""
 AIR_STATE = named_rows(
-    *("regulated", "opened", "drop", "line", "line_rate"),
+    *("regulated", "opened", "drop", "lost", "line", "line_rate"),
     *("space", "here", "gives", "ahead", "slope"),
 )
-"""Rows of the state of valve, supply and line, from the first; then those of the air in the muscle:
+"""Rows of the state of valve, supply and line, from the first, with the pressure that the leak has
+lost in the control period [Pa] (``lost``); then those of the air in the muscle:
 volume of its pressure [m3] (0 before the first sub-step), volume at the present position, change of
 the volume with the displacement, predicted displacement to the middle of a sub-step, and rise of
 the pressure with the displacement (:mod:`pam_envs.pneumatics.enclosed_air`)."""
@@ -301,7 +302,7 @@ def leaked(
 ) -> float:  # fmt: skip
     """Return the pressure [Pa] ``reached`` less its leak, and lower the supply by what it took.
 
-    ``rest`` is the pressure of the supply at rest [Pa].
+    ``rest`` is the pressure of the supply at rest [Pa]. The lost pressure is added to ``lost``.
     """
     rows[state + AIR_STATE.drop][j] = supply_drop(
         rows[state + AIR_STATE.drop][j],
@@ -311,7 +312,10 @@ def leaked(
         fixed[effects + AIR.supply_recovery][j],
         h,
     )
-    return reached * decay(fixed[effects + AIR.leak][j] * h)  # type: ignore[no-any-return]
+    kept = reached * decay(fixed[effects + AIR.leak][j] * h)
+    lost = rows[state + AIR_STATE.lost]
+    lost[j] = lost[j] + (reached - kept)
+    return kept  # type: ignore[no-any-return]
 
 
 @kernel
@@ -393,8 +397,17 @@ def begin_air(rows: Any, j: int, state: int, pressure: float) -> None:
     """Begin valve, supply and line of one lane at rest at a pressure [Pa]."""
     rows[state + AIR_STATE.regulated][j] = rows[state + AIR_STATE.line][j] = pressure
     rows[state + AIR_STATE.opened][j] = rows[state + AIR_STATE.drop][j] = 0.0
+    rows[state + AIR_STATE.lost][j] = 0.0
     rows[state + AIR_STATE.line_rate][j] = rows[state + AIR_STATE.space][j] = 0.0
     rows[state + AIR_STATE.ahead][j] = rows[state + AIR_STATE.slope][j] = 0.0
+
+
+@kernel
+def begin_leak(rows: Any, state: int) -> None:
+    """Begin to count the pressure that the leaks of a tile lose in a control period."""
+    lost = rows[state + AIR_STATE.lost]
+    for j in range(LANES):
+        lost[j] = 0.0
 
 
 @kernel

@@ -30,6 +30,7 @@ from pam_envs.pneumatics.regulator import (
     RegulatorEffects,
     air_step,
     begin_air,
+    begin_leak,
     delay_commands,
     late_shares,
     line_effects_on,
@@ -117,6 +118,7 @@ def path_air(
     """
     if i == 0:
         delay(rows, fixed, delayed, plain, set_point, step, period)
+        begin_leak(rows, state + PATH_STATE.air)
     own = scratch(4, LANES)
     late, width = own[2], own[3]
     full, lag, slew = (

@@ -145,6 +145,12 @@ def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def leaked_air(rows: Any, fixed: Any, j: int) -> float:
+    """Return the air [kg] that leaked in this control period: a plain plant has no leak."""
+    return 0.0
+
+
+@kernel
 def lag(rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float) -> None:
     """Advance the pressure behind dead time, rate limit and first-order lag."""
     follow_set_point(

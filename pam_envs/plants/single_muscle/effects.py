@@ -52,8 +52,10 @@ from pam_envs.pneumatics.enclosed_air import (
 )
 from pam_envs.pneumatics.regulator import (
     AIR,
+    AIR_STATE,
     air_step,
     begin_air,
+    begin_leak,
     delay_commands,
     late_shares,
     line_effects_on,
@@ -299,6 +301,12 @@ def seen_pressure(rows: Any, j: int) -> float:
 
 
 @kernel
+def lost_pressure(rows: Any, j: int) -> float:
+    """Return the pressure [Pa] that leaked in this control period."""
+    return rows[EFFECTS_AT + S.air + AIR_STATE.lost][j]  # type: ignore[no-any-return]
+
+
+@kernel
 def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) -> None:
     """Write the linearised motion of a tile, the effective pressure going from ``was``.
 
@@ -433,6 +441,7 @@ def advance_extended(
         rows, R.HISTORY, rows[R.SET_POINT], fixed[R.REGULATOR_DEAD_TIME], counts[R.STEP], period,
         older, newer, switch,
     )  # fmt: skip
+    begin_leak(rows, air)
     for i in range(substeps):
         late_shares(switch, i, substeps, period, late)
         if flows > 0:
@@ -513,4 +522,5 @@ def replacements(kind: str, first: int) -> dict[str, Any]:
         "true_position": true_position,
         "seen_position": seen_position,
         "seen_pressure": seen_pressure,
+        "lost_pressure": lost_pressure,
     }
