@@ -48,7 +48,8 @@ def creep_step(
         lag = rows[state + k]
         for j in range(first, last):
             kept = decay(width[j] / fixed[time + k][j])
-            lag[j] = value[j] - (value[j] - lag[j]) * kept
+            follows = value[j] - (value[j] - lag[j]) * kept
+            lag[j] = follows if width[j] > 0.0 else lag[j]
             total[j] = total[j] + fixed[compliance + k][j] * lag[j]
 
 

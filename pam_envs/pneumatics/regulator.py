@@ -304,14 +304,16 @@ def leaked(
 
     ``rest`` is the pressure of the supply at rest [Pa]. The lost pressure is added to ``lost``.
     """
-    rows[state + AIR_STATE.drop][j] = supply_drop(
-        rows[state + AIR_STATE.drop][j],
+    drop = rows[state + AIR_STATE.drop]
+    fallen = supply_drop(
+        drop[j],
         reached - pressure,
         rest,
         fixed[effects + AIR.supply_droop][j],
         fixed[effects + AIR.supply_recovery][j],
         h,
     )
+    drop[j] = fallen if h > 0.0 else drop[j]  # lanes that wait keep their bits
     kept = reached * decay(fixed[effects + AIR.leak][j] * h)
     lost = rows[state + AIR_STATE.lost]
     lost[j] = lost[j] + (reached - kept)
@@ -333,8 +335,8 @@ def regulate_with_effects(
     goal = fixed[effects + AIR.gain][j] * target
     wide = fixed[effects + AIR.dead_band][j]
     band = wide * fixed[effects + AIR.dead_close][j]
-    off, opened = abs(goal - pressure), rows[state + AIR_STATE.opened][j]
-    opened = 1.0 if off > wide else (opened if off > band * 1.0000001 else 0.0)
+    off, before = abs(goal - pressure), rows[state + AIR_STATE.opened][j]
+    opened = 1.0 if off > wide else (before if off > band * 1.0000001 else 0.0)
     goal = goal if opened > 0.0 else pressure
     stop_low, stop_high = min(pressure, goal + band), max(pressure, goal - band)
     lag = lag_towards(fixed, j, effects, lag, pressure, goal, full)
@@ -356,7 +358,8 @@ def regulate_with_effects(
     reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
     # the valve closes when the error has fallen to the band
     stopped = min(reached, stop_high) if goal > pressure else max(reached, stop_low)
-    rows[state + AIR_STATE.opened][j] = opened if stopped == reached else 0.0
+    stays = opened if stopped == reached else 0.0
+    rows[state + AIR_STATE.opened][j] = stays if h > 0.0 else before
     reached = stopped
     reached = pressure if target < 0.0 else reached
     return leaked(rows, fixed, j, state, effects, rest, pressure, reached, h)
@@ -489,7 +492,10 @@ def air_step(
         pressure[j] = after
     if lines > 0:
         for j in range(LANES):
-            pressure[j] = line_step(
-                rows, fixed, j, state + AIR_STATE.line, effects + AIR.ring_share, own[0][j],
-                pressure[j], width[j],
-            )  # fmt: skip
+            if width[j] > 0.0:
+                pressure[j] = line_step(
+                    rows, fixed, j, state + AIR_STATE.line, effects + AIR.ring_share, own[0][j],
+                    pressure[j], width[j],
+                )  # fmt: skip
+            else:
+                pressure[j] = own[1][j]
