@@ -266,6 +266,38 @@ def stage_widths(late: Any, stage: int, h: float, width: Any) -> int:
 
 
 @kernel
+def switch_substeps(
+    switch: Any, substeps: int, period: float, at: Any, late: Any
+) -> None:
+    """Write in which sub-step the setpoint switches, and the share of it after the ``switch`` [s].
+
+    Where it does not switch within the period, that is sub-step ``substeps`` with share 1.
+    """
+    for j in range(LANES):
+        at[j], late[j] = float(substeps), 1.0
+    for i in range(substeps):
+        for j in range(LANES):
+            share = delayed_fraction((i + 1) * (period / substeps), substeps / period, switch[j])
+            first = share > 0.0 and at[j] == substeps
+            at[j], late[j] = (float(i) if first else at[j]), (share if first else late[j])
+
+
+@kernel
+def interval_of(
+    n: int, at: Any, late: Any, older: Any, newer: Any, h: float, target: Any, width: Any
+) -> None:
+    """Write setpoints and durations [s] of interval ``n`` of a control period.
+
+    A lane has the intervals of its sub-steps, with the sub-step of the switch divided in two.
+    """
+    for j in range(LANES):
+        before = n <= at[j]
+        share = late[j] if (n == at[j] if before else n - 1 == at[j]) else (0.0 if before else 1.0)
+        width[j] = h * (1.0 - share if before else share)
+        target[j] = older[j] if before else newer[j]
+
+
+@kernel
 def regulator_step(
     pressure: float, goal: float, lag: float, per_lag: float, slew: float, per_slew: float, h: float
 ) -> float:

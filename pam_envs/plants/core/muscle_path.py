@@ -16,6 +16,7 @@ from pam_envs.hysteresis.friction_effects import (
     CreepEffects,
     FirstCycles,
     begin_creep,
+    creep_left,
     creep_step,
     newness,
 )
@@ -177,14 +178,17 @@ def path_muscle(
     ``warm`` is the first row of the muscle's temperature (``WARM``), ``pressure`` are those after
     ``h`` seconds; otherwise see :func:`path_air`.
     """
-    width = scratch(1, LANES)
+    own = scratch(5, LANES)
     for j in range(LANES):
-        width[0][j] = h
+        own[4][j] = h
         crept[j] = 0.0
         factor[j] = 1.0
+    creep_left(
+        fixed, effects + PATH.creep_1, effects + PATH.creep_time_1, 0, LANES, own[4], own
+    )
     creep_step(
-        rows, fixed, state + PATH_STATE.creep, effects + PATH.creep_1, effects + PATH.creep_time_1,
-        0, LANES, pressure, width[0], crept,
+        rows, fixed, state + PATH_STATE.creep, effects + PATH.creep_1, 0, LANES, pressure, own,
+        crept,
     )  # fmt: skip
     if factors_on(fixed, effects, warm) > 0:
         for j in range(LANES):
