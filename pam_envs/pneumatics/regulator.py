@@ -266,9 +266,7 @@ def stage_widths(late: Any, stage: int, h: float, width: Any) -> int:
 
 
 @kernel
-def switch_substeps(
-    switch: Any, substeps: int, period: float, at: Any, late: Any
-) -> None:
+def switch_substeps(switch: Any, substeps: int, period: float, at: Any, late: Any) -> None:
     """Write in which sub-step the setpoint switches, and the share of it after the ``switch`` [s].
 
     Where it does not switch within the period, that is sub-step ``substeps`` with share 1.

@@ -183,9 +183,7 @@ def path_muscle(
         own[4][j] = h
         crept[j] = 0.0
         factor[j] = 1.0
-    creep_left(
-        fixed, effects + PATH.creep_1, effects + PATH.creep_time_1, 0, LANES, own[4], own
-    )
+    creep_left(fixed, effects + PATH.creep_1, effects + PATH.creep_time_1, 0, LANES, own[4], own)
     creep_step(
         rows, fixed, state + PATH_STATE.creep, effects + PATH.creep_1, 0, LANES, pressure, own,
         crept,

@@ -39,6 +39,7 @@ start_friction: Any = None
 settle_friction: Any = None
 rest: Any = None
 report: Any = None
+report_tile: Any = None
 SENSED = (K.TENSION, K.ANGLE, K.PRESSURE, K.HEEL, K.GROUND_Z, K.COP, K.ANKLE)
 """Rows of undisturbed readings, in the order of ``SENSORS``; effects replace them."""
 EFFECTIVE = K.PRESSURE
@@ -215,8 +216,7 @@ def advance(
         move(rows, fixed, counts, gait, i, substeps, h, work)
         settle_air(rows, fixed, h, work)
         slide(rows, fixed, counts, table, hysteresis, elements, 0.0, work)
-    for j in range(LANES):
-        report(rows, fixed, j, period)
+    report_tile(rows, fixed, period)
     read_sensors(rows, fixed, counts[K.STEP], period)
 
 

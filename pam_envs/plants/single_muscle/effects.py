@@ -167,9 +167,7 @@ def settled(
     for j in range(first, last):
         own[1][j] = 1e9
         rows[EFFECTS_AT + S.kelvin][j] = fixed[R.MUSCLE_TEMPERATURE][j]
-    creep_left(
-        fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, first, last, own[1], left
-    )
+    creep_left(fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, first, last, own[1], left)
     effective_pressure(
         rows, fixed, counts, table, hysteresis, first, last, elements, work, left, own, 1, 1
     )
@@ -375,9 +373,7 @@ def finer_pull(
 
 
 @kernel
-def forces(
-    rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, finer: int
-) -> None:
+def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, finer: int) -> None:
     """Write the linearised motion of a tile, the effective pressure going from ``was``.
 
     Rows 3 to 7 of ``own``, per unit mass: stiffness, push at the predicted middle, jerk, damping,
@@ -464,12 +460,8 @@ def move(
         width[j] = h
     if stretches > 0:
         left = scratch(4, LANES)
-        creep_left(
-            fixed, R.MUSCLE_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left
-        )
-        creep_step(
-            rows, fixed, EFFECTS_AT + S.stretch, R.MUSCLE_CREEP_1, 0, LANES, x, left, shown
-        )
+        creep_left(fixed, R.MUSCLE_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left)
+        creep_step(rows, fixed, EFFECTS_AT + S.stretch, R.MUSCLE_CREEP_1, 0, LANES, x, left, shown)
     for j in range(LANES):
         rows[EFFECTS_AT + S.position][j] = shown[j] - rows[R.REST][j]
     if mounts > 0:
@@ -546,9 +538,7 @@ def advance_extended(
     begin_leak(rows, air)
     for j in range(LANES):
         width[j] = h
-    creep_left(
-        fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left
-    )
+    creep_left(fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left)
     # pressures that follow from the setpoints alone are one interval ahead of the motion
     leads = 1 if STAGED + flows + lines + worn == 0 else 0
     if leads > 0:
