@@ -402,12 +402,13 @@ def regulate_with_leak(
 ) -> float:  # fmt: skip
     """Return the same as :func:`regulate_with_effects` without bands, overlap, bend and choking.
 
-    Gain, slower exhaust, supply and leak are left: the effects of a normal day.
+    Gain, evenly slower exhaust, supply and leak are left: the effects of a normal day.
     """
     pressure = rows[state + AIR_STATE.regulated][j]
     drop, rest = rows[state + AIR_STATE.drop][j], fixed[effects + AIR.supply_pressure][j]
     goal = fixed[effects + AIR.gain][j] * target
-    lag = lag_towards(fixed, j, effects, lag, pressure, goal, full)
+    slower = fixed[effects + AIR.exhaust_ratio][j] - 1.0
+    lag = lag * (1.0 + slower if goal < pressure else 1.0)
     reached = regulator_step(pressure, goal, lag, 1.0 / lag, slew, 1.0 / slew, h)
     reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
     reached = pressure if target < 0.0 else reached
@@ -451,6 +452,7 @@ def valve_effects_on(fixed: Any, effects: int) -> int:
         + count_on(fixed[effects + AIR.overlap], 0.0)
         + count_on(fixed[effects + AIR.exhaust_rate], UNCHOKED)
         + count_on(fixed[effects + AIR.slew_bend], 0.0)
+        + count_on(fixed[effects + AIR.exhaust_taper], 0.0)
     )
     daily = (
         count_on(fixed[effects + AIR.exhaust_ratio], 1.0)

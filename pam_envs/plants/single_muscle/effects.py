@@ -91,17 +91,22 @@ def effective_pressure(
     """Compute the effective pressure from the pressure; ``left`` is that of the creep's step."""
     pressure, drive = rows[R.PRESSURE], rows[R.DRIVE]
     true, friction, most = own[0], rows[EFFECTS_AT + S.friction], own[2]
-    for j in range(first, last):
-        true[j] = pressure[j]
-        pressure[j] = max(0.0, pressure[j] - fixed[R.HYSTERESIS_THRESHOLD][j])
-    plain_hysteresis(rows, fixed, counts, table, hysteresis, first, last, elements, work)
-    for j in range(first, last):
-        above = pressure[j]
-        pressure[j] = true[j]
-        friction[j] = above - drive[j]
-        drive[j] = above - friction[j]
-        true[j] = above
-        most[j] = 0.0
+    if STAGED > 0:
+        for j in range(first, last):
+            true[j] = pressure[j]
+            pressure[j] = max(0.0, pressure[j] - fixed[R.HYSTERESIS_THRESHOLD][j])
+        plain_hysteresis(rows, fixed, counts, table, hysteresis, first, last, elements, work)
+        for j in range(first, last):
+            above = pressure[j]
+            pressure[j] = true[j]
+            friction[j] = above - drive[j]
+            drive[j] = above - friction[j]
+            true[j] = above
+            most[j] = 0.0
+    else:
+        for j in range(first, last):
+            true[j] = drive[j] = max(0.0, pressure[j] - fixed[R.HYSTERESIS_THRESHOLD][j])
+            friction[j] = most[j] = 0.0
     for k in range(elements if worn > 0 else 0):
         for j in range(first, last):
             most[j] = most[j] + fixed[R.WEIGHT + k][j] * fixed[R.THRESHOLD + k][j]
@@ -328,11 +333,14 @@ def finer_terms_on(fixed: Any) -> int:
 
 @kernel
 def plain_pull(
-    rows: Any, fixed: Any, j: int, was: float, x: float
+    rows: Any, fixed: Any, j: int, was: float, x: float, own: Any
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Return :func:`finer_pull` where no finer term is on: the same bits by fewer operations."""
-    e, strain = x * (1.0 / fixed[R.MUSCLE_REST_LENGTH][j]), fixed[R.MUSCLE_BRAID_STRAIN][j]
-    slack, load = decay(e / strain), rows[R.LOAD][j]
+    """Return :func:`finer_pull` where no finer term is on: the same bits by fewer operations.
+
+    Rows 8 and 9 of ``own`` are 1 / rest length [1/m] and braid force / strain [N].
+    """
+    e = x * own[8][j]
+    slack, load = decay(e / fixed[R.MUSCLE_BRAID_STRAIN][j]), rows[R.LOAD][j]
     area, taper = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j]
     force, k1, k3 = (
         fixed[R.MUSCLE_BRAID_FORCE][j],
@@ -341,7 +349,7 @@ def plain_pull(
     )
     middle = 0.5 * (was + rows[R.DRIVE][j])
     pull = tension(was, e, slack, area, taper, force, k1, k3)
-    slope = tension_slope(middle, e, slack, area, taper, force / strain, k1, k3)
+    slope = tension_slope(middle, e, slack, area, taper, own[9][j], k1, k3)
     damping, grown = fixed[R.MASS_DAMPING][j], area * (1.0 - taper * e)
     return pull, slope, load, load * GRAVITY, 0.0, damping, grown
 
@@ -377,7 +385,7 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, fi
     """Write the linearised motion of a tile, the effective pressure going from ``was``.
 
     Rows 3 to 7 of ``own``, per unit mass: stiffness, push at the predicted middle, jerk, damping,
-    and one over the mass [1/kg].
+    and one over the mass [1/kg]. Rows 8 and 9 are constant (:func:`plain_pull`).
     """
     x, v = rows[R.CONTRACTION], rows[R.VELOCITY]
     friction, sticking, strain = own[0], own[1], own[3]
@@ -397,7 +405,7 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, fi
             write_motion(rows, fixed, j, was[j], h, own, *found)
     else:
         for j in range(LANES):
-            found = plain_pull(rows, fixed, j, was[j], x[j] + 0.5 * h * v[j])
+            found = plain_pull(rows, fixed, j, was[j], x[j] + 0.5 * h * v[j], own)
             write_motion(rows, fixed, j, was[j], h, own, *found)
 
 
@@ -411,8 +419,7 @@ def write_motion(
     pull, slope = pull - own[0][j], slope + own[1][j]
     pull, slope = pull - rub * rows[R.LAG][j], slope + rub * rows[R.STICK][j]
     slope = slope + eased
-    per_length = 1.0 / fixed[R.MUSCLE_REST_LENGTH][j]
-    stiff = slope * per_length + air_stiffness(rows, j, EFFECTS_AT + S.air)
+    stiff = slope * own[8][j] + air_stiffness(rows, j, EFFECTS_AT + S.air)
     moved = max(0.0, mass) * fixed[R.MASS_CARRIED][j] + fixed[R.MASS_MOVING_MASS][j]
     # motion that is over within the sub-step is followed as slowly as the series reaches
     per_mass = 1.0 / max(moved, loss * h * FASTEST_DECAY, stiff * h * h * FASTEST_TURN)
@@ -510,7 +517,7 @@ def advance_extended(
     drive, load = rows[R.DRIVE], rows[R.LOAD]
     older, newer, switch, was, width = work[3], work[4], work[5], work[6], work[7]
     late = work[8]
-    own, left = scratch(8, LANES), scratch(4, LANES)
+    own, left = scratch(10, LANES), scratch(4, LANES)
     air, effects, shift, end = EFFECTS_AT + S.air, R.EFFECT.regulator, work[9], own[2]
     flows, creeps = flows_on(fixed, effects), creeps_on(fixed, R.HYSTERESIS_CREEP_1)
     stretches = creeps_on(fixed, R.MUSCLE_CREEP_1)
@@ -538,6 +545,8 @@ def advance_extended(
     begin_leak(rows, air)
     for j in range(LANES):
         width[j] = h
+        own[8][j] = 1.0 / fixed[R.MUSCLE_REST_LENGTH][j]
+        own[9][j] = fixed[R.MUSCLE_BRAID_FORCE][j] / fixed[R.MUSCLE_BRAID_STRAIN][j]
     creep_left(fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left)
     # pressures that follow from the setpoints alone are one interval ahead of the motion
     leads = 1 if STAGED + flows + lines + worn == 0 else 0
