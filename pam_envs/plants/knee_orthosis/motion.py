@@ -125,6 +125,7 @@ READ = named_rows(
     *("lean_bend", "ankle", "loaded", "leaning", "cop"),
 )
 """Rows of what :func:`read_gait` reads."""
+N_READ = len(READ)
 
 
 @kernel
@@ -511,7 +512,7 @@ def begin_period_leg(
 ) -> None:
     """Read the wearer's path at the end of the period and the stiffness with which he holds it."""
     draw_strides(rows, fixed, counts, 1, 1, period)
-    read = scratch(len(READ), LANES)
+    read = scratch(N_READ, LANES)
     for j in range(LANES):
         read_gait(rows, fixed, gait, j, (counts[K.STEP][j] + 1) * period, read)
     for j in range(LANES):
@@ -729,7 +730,7 @@ def rest_leg(
     for k in range(BINS):
         rows[K.EXPECTED + k][j] = 0.0
     draw_stride(rows, fixed, counts, j, 0.0)
-    read = scratch(len(READ), LANES)
+    read = scratch(N_READ, LANES)
     read_gait(rows, fixed, gait, j, 0.0, read)
     gait_at(rows, fixed, j, read)
     load = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
