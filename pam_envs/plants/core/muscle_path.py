@@ -42,9 +42,10 @@ from pam_envs.pneumatics.regulator import (
 
 REGULATOR = named_rows("max_pressure", "dead_time", "time_constant", "slew_rate")
 """Rows of a regulator's plain parameters, from the first."""
-DELAYED = row_blocks(commands=N_HISTORY, older=1, newer=1, switch=1)
+DELAYED = row_blocks(commands=N_HISTORY, older=1, newer=1, switch=1, per_lag=1, per_slew=1)
 """State of a dead time, from its first row: the last setpoints; the two that take effect in a
-control period [Pa], and the time between them [s]."""
+control period [Pa], and the time between them [s]. Then the reciprocals of time constant and slew
+rate, of a regulator without effects."""
 PATH = parameter_rows(RegulatorEffects, CreepEffects, FirstCycles)
 """Rows of the effects that all muscles of a plant share, from the first."""
 WARM = parameter_rows(TemperatureEffects)
@@ -89,19 +90,33 @@ def follow_set_point(
     ``delayed`` and ``plain`` are the first rows of the dead time's state (``DELAYED``) and of the
     regulator (``REGULATOR``); ``pressure``, ``set_point`` [Pa] and ``step`` are rows.
     """
+    lag, slew = fixed[plain + REGULATOR.time_constant], fixed[plain + REGULATOR.slew_rate]
+    per_lag, per_slew = rows[delayed + DELAYED.per_lag], rows[delayed + DELAYED.per_slew]
     if i == 0:
         delay(rows, fixed, delayed, plain, set_point, step, period)
-    lag, slew = fixed[plain + REGULATOR.time_constant], fixed[plain + REGULATOR.slew_rate]
+        for j in range(LANES):
+            per_lag[j] = 1.0 / lag[j]
+        for j in range(LANES):
+            per_slew[j] = 1.0 / slew[j]
     own = scratch(2, LANES)
     late, width = own[0], own[1]
     late_shares(rows[delayed + DELAYED.switch], i, substeps, period, late)
+    earlier = count_on(late, 1.0)  # lanes whose newer setpoint is not yet in effect, or in part
+    if earlier == 0 or count_on(late, 0.0) == 0:  # one setpoint in all lanes
+        target = rows[delayed + (DELAYED.newer if earlier == 0 else DELAYED.older)]
+        for j in range(LANES):
+            pressure[j] = regulator_step(
+                pressure[j], max(0.0, target[j]), lag[j], per_lag[j], slew[j], per_slew[j],
+                period / substeps,
+            )  # fmt: skip
+        return
     for stage in range(2):  # towards the older setpoint, then towards the newer one
         if stage_widths(late, stage, period / substeps, width) == 0:
             continue
         target = rows[delayed + (DELAYED.newer if stage == 1 else DELAYED.older)]
         for j in range(LANES):
             reached = regulator_step(
-                pressure[j], max(0.0, target[j]), lag[j], 1.0 / lag[j], slew[j], 1.0 / slew[j],
+                pressure[j], max(0.0, target[j]), lag[j], per_lag[j], slew[j], per_slew[j],
                 width[j],
             )  # fmt: skip
             pressure[j] = reached if width[j] > 0.0 else pressure[j]
