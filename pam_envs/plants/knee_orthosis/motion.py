@@ -83,7 +83,7 @@ def draw_stride(rows: Any, fixed: Any, counts: Any, j: int, time: float) -> None
 
 @kernel
 def draw_strides(
-    rows: Any, fixed: Any, counts: Any, per_period: int, offset: int, h: float
+    rows: Any, fixed: Any, counts: Any, per_period: float, offset: float, h: float
 ) -> None:
     """Draw the strides that a tile has begun, ``offset`` parts of ``h`` seconds into a period."""
     begun = 0
