@@ -276,8 +276,10 @@ def switch_substeps(switch: Any, substeps: int, period: float, at: Any, late: An
     for i in range(substeps):
         for j in range(LANES):
             share = delayed_fraction((i + 1) * (period / substeps), substeps / period, switch[j])
-            first = share > 0.0 and at[j] == substeps
-            at[j], late[j] = (float(i) if first else at[j]), (share if first else late[j])
+            found, part = at[j], late[j]
+            first = share > 0.0 and found == substeps
+            at[j] = float(i) if first else found
+            late[j] = share if first else part
 
 
 @kernel
@@ -289,10 +291,12 @@ def interval_of(
     A lane has the intervals of its sub-steps, with the sub-step of the switch divided in two.
     """
     for j in range(LANES):
-        before = n <= at[j]
-        share = late[j] if (n == at[j] if before else n - 1 == at[j]) else (0.0 if before else 1.0)
-        width[j] = h * (1.0 - share if before else share)
-        target[j] = older[j] if before else newer[j]
+        passed, share = n - at[j], late[j]
+        first, second = older[j], newer[j]
+        part = 1.0 - share if passed == 0.0 else 1.0
+        part = share if passed == 1.0 else part
+        width[j] = h * part
+        target[j] = first if passed <= 0.0 else second
 
 
 @kernel

@@ -493,8 +493,10 @@ def lead_pressures(
     at, late, target, ahead, before = work[10], work[11], work[12], work[13], work[14]
     for n in range(0 if i == 0 else i + 1, i + 2):
         interval_of(n, at, late, older, newer, h, target, width)
+        given = ahead if n > 0 else pressure
         for j in range(LANES):
-            before[j] = ahead[j] if n > 0 else pressure[j]
+            before[j] = given[j]
+        for j in range(LANES):
             ahead[j] = before[j]
         air_step(
             rows, fixed, EFFECTS_AT + S.air, R.EFFECT.regulator, ahead,
@@ -504,7 +506,8 @@ def lead_pressures(
         for j in range(LANES):
             travel[j] += abs(ahead[j] - own[1][j])
     for j in range(LANES):
-        pressure[j] = ahead[j] if at[j] <= i else before[j]
+        last, earlier = ahead[j], before[j]
+        pressure[j] = last if at[j] <= i else earlier
 
 
 @kernel
@@ -607,8 +610,12 @@ def advance_extended(
                 for j in range(LANES):
                     was[j] = drive[j]
                     end[j] = end[j] + shift[j]
-            for j in range(LANES):
-                drive[j] = was[j] + (end[j] - was[j]) / (parts - q)
+            if parts - q > 1:
+                for j in range(LANES):
+                    drive[j] = was[j] + (end[j] - was[j]) / (parts - q)
+            else:
+                for j in range(LANES):
+                    drive[j] = was[j] + (end[j] - was[j])
             move(
                 rows, fixed, counts, table, hysteresis, elements, was, h / parts, own, strands,
                 sticks, mounts, stretches, finer,
