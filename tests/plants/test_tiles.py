@@ -63,3 +63,22 @@ def test_plant_has_the_same_bits_beside_plants_with_other_dead_times(
     for k, own in enumerate(sets):
         alone = run(loop, plants[0], [own], drives, lanes=1, compiled=False)
         assert np.array_equal(together[:, :, k], alone[:, :, 0])
+
+
+def test_pressure_behind_a_regulator_does_not_depend_on_the_hysteresis() -> None:
+    day = {"regulator.leak": 0.3, "regulator.supply_pressure": 5e5, "regulator.supply_droop": 0.1}
+    setpoints = np.repeat(np.random.default_rng(1).uniform(-1e5, 4e5, 30), 4)
+    drives = drives_of([setpoints, 1.0, 293.15, 0.0, 0.0])
+    pressures = []
+    for kind in ("maxwell_slip", "maxwell_slip_length", "none"):
+        plants = [
+            SingleMuscle.mas10(kind).replace({**day, "regulator.dead_time": time})
+            for time in (0.0, 0.02, 0.0413, 0.0552, 0.08)
+        ]
+        sets = [plant.parameter_rows() for plant in plants]
+        made = run(
+            loop_of(plants[0], True), plants[0], sets, drives, plants=5, lanes=5, compiled=False
+        )
+        pressures.append(made[2])
+    assert np.ptp(pressures[0]) > 1e5
+    assert np.array_equal(pressures[0], pressures[1]) and np.array_equal(pressures[0], pressures[2])
