@@ -31,24 +31,37 @@ class CreepEffects:
 
 
 @kernel
+def creep_left(
+    fixed: Any, compliance: int, time: int, first: int, last: int, width: Any, left: Any
+) -> None:
+    """Write the shares of the elements' gaps that are left after ``width`` seconds, by element.
+
+    ``compliance`` and ``time`` are the first rows of compliances and time constants [s].
+    """
+    for k in range(ELEMENTS):
+        if count_on(fixed[compliance + k], 0.0) > 0:
+            for j in range(first, last):
+                left[k][j] = decay(width[j] / fixed[time + k][j])
+
+
+@kernel
 def creep_step(
-    rows: Any, fixed: Any, state: int, compliance: int, time: int, first: int, last: int,
-    value: Any,
-    width: Any, total: Any,
+    rows: Any, fixed: Any, state: int, compliance: int, first: int, last: int, value: Any,
+    left: Any, total: Any,
 ) -> None:  # fmt: skip
     """Add the creep of lanes ``first`` to ``last`` to the row ``total``.
 
-    ``state``, ``compliance`` and ``time`` are the first rows of the elements' state, compliances
-    and time constants [s]; ``value`` is the quantity that they follow, over ``width`` seconds.
-    Elements without compliance in the whole tile stay behind.
+    ``state`` and ``compliance`` are the first rows of the elements' state and compliances,
+    ``value`` is the quantity that they follow, ``left`` is that of :func:`creep_left`. Elements
+    without compliance in the whole tile stay behind.
     """
     for k in range(ELEMENTS):
         if count_on(fixed[compliance + k], 0.0) == 0:
             continue
         lag = rows[state + k]
         for j in range(first, last):
-            kept = decay(width[j] / fixed[time + k][j])
-            lag[j] = value[j] - (value[j] - lag[j]) * kept
+            follows = value[j] - (value[j] - lag[j]) * left[k][j]
+            lag[j] = follows if left[k][j] < 1.0 else lag[j]
             total[j] = total[j] + fixed[compliance + k][j] * lag[j]
 
 

@@ -227,10 +227,11 @@ class BundleRegulator(RegulatorEffects):
 AIR = parameter_rows(RegulatorEffects)
 """Rows of the effects of valve, supply and line, from the first."""
 AIR_STATE = named_rows(
-    *("regulated", "opened", "drop", "line", "line_rate"),
-    *("pilot", "pilot_rate", "space", "here", "gives", "ahead", "slope"),
+    *("regulated", "opened", "drop", "lost", "line", "line_rate", "pilot", "pilot_rate"),
+    *("space", "here", "gives", "ahead", "slope"),
 )
-"""Rows of the state of valve, supply and line, from the first; then those of the air in the muscle:
+"""Rows of the state of valve, supply and line, from the first, with the pressure that the leak has
+lost in the control period [Pa] (``lost``); then those of the air in the muscle:
 volume of its pressure [m3] (0 before the first sub-step), volume at the present position, change of
 the volume with the displacement, predicted displacement to the middle of a sub-step, and rise of
 the pressure with the displacement (:mod:`pam_envs.pneumatics.enclosed_air`)."""
@@ -272,6 +273,40 @@ def stage_widths(late: Any, stage: int, h: float, width: Any) -> int:
 
 
 @kernel
+def switch_substeps(switch: Any, substeps: int, period: float, at: Any, late: Any) -> None:
+    """Write in which sub-step the setpoint switches, and the share of it after the ``switch`` [s].
+
+    Where it does not switch within the period, that is sub-step ``substeps`` with share 1.
+    """
+    for j in range(LANES):
+        at[j], late[j] = float(substeps), 1.0
+    for i in range(substeps):
+        for j in range(LANES):
+            share = delayed_fraction((i + 1) * (period / substeps), substeps / period, switch[j])
+            found, part = at[j], late[j]
+            first = share > 0.0 and found == substeps
+            at[j] = float(i) if first else found
+            late[j] = share if first else part
+
+
+@kernel
+def interval_of(
+    n: int, at: Any, late: Any, older: Any, newer: Any, h: float, target: Any, width: Any
+) -> None:
+    """Write setpoints and durations [s] of interval ``n`` of a control period.
+
+    A lane has the intervals of its sub-steps, with the sub-step of the switch divided in two.
+    """
+    for j in range(LANES):
+        passed, share = n - at[j], late[j]
+        first, second = older[j], newer[j]
+        part = 1.0 - share if passed == 0.0 else 1.0
+        part = share if passed == 1.0 else part
+        width[j] = h * part
+        target[j] = first if passed <= 0.0 else second
+
+
+@kernel
 def regulator_step(
     pressure: float, goal: float, lag: float, per_lag: float, slew: float, per_slew: float, h: float
 ) -> float:
@@ -308,17 +343,22 @@ def leaked(
 ) -> float:  # fmt: skip
     """Return the pressure [Pa] ``reached`` less its leak, and lower the supply by what it took.
 
-    ``rest`` is the pressure of the supply at rest [Pa].
+    ``rest`` is the pressure of the supply at rest [Pa]. The lost pressure is added to ``lost``.
     """
-    rows[state + AIR_STATE.drop][j] = supply_drop(
-        rows[state + AIR_STATE.drop][j],
+    drop = rows[state + AIR_STATE.drop]
+    fallen = supply_drop(
+        drop[j],
         reached - pressure,
         rest,
         fixed[effects + AIR.supply_droop][j],
         fixed[effects + AIR.supply_recovery][j],
         h,
     )
-    return reached * decay(fixed[effects + AIR.leak][j] * h)  # type: ignore[no-any-return]
+    drop[j] = fallen if h > 0.0 else drop[j]  # lanes that wait keep their bits
+    kept = reached * decay(fixed[effects + AIR.leak][j] * h)
+    lost = rows[state + AIR_STATE.lost]
+    lost[j] = lost[j] + (reached - kept)
+    return kept  # type: ignore[no-any-return]
 
 
 SHORTEST_PILOT = 0.25
@@ -336,7 +376,7 @@ def pilot_step(
     zero) the pilot follows the ``pressure``.
     """
     lag = fixed[effects + AIR.pilot_lag][j]
-    if lag <= 0.0:
+    if lag <= 0.0 or h <= 0.0:
         return target
     if target < 0.0:
         rows[state + AIR_STATE.pilot][j] = pressure
@@ -364,8 +404,8 @@ def regulate_with_effects(
     goal = fixed[effects + AIR.gain][j] * target
     wide = fixed[effects + AIR.dead_band][j]
     band = wide * fixed[effects + AIR.dead_close][j]
-    off, opened = abs(goal - pressure), rows[state + AIR_STATE.opened][j]
-    opened = 1.0 if off > wide else (opened if off > band * 1.0000001 else 0.0)
+    off, before = abs(goal - pressure), rows[state + AIR_STATE.opened][j]
+    opened = 1.0 if off > wide else (before if off > band * 1.0000001 else 0.0)
     goal = goal if opened > 0.0 else pressure
     stop_low, stop_high = min(pressure, goal + band), max(pressure, goal - band)
     lag = lag_towards(fixed, j, effects, lag, pressure, goal, full)
@@ -388,7 +428,8 @@ def regulate_with_effects(
     reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
     # the valve closes when the error has fallen to the band
     stopped = min(reached, stop_high) if goal > pressure else max(reached, stop_low)
-    rows[state + AIR_STATE.opened][j] = opened if stopped == reached else 0.0
+    stays = opened if stopped == reached else 0.0
+    rows[state + AIR_STATE.opened][j] = stays if h > 0.0 else before
     reached = stopped
     reached = pressure if target < 0.0 else reached
     return leaked(rows, fixed, j, state, effects, rest, pressure, reached, h)
@@ -401,12 +442,13 @@ def regulate_with_leak(
 ) -> float:  # fmt: skip
     """Return the same as :func:`regulate_with_effects` without bands, overlap, bend and choking.
 
-    Gain, slower exhaust, supply and leak are left: the effects of a normal day.
+    Gain, evenly slower exhaust, supply and leak are left: the effects of a normal day.
     """
     pressure = rows[state + AIR_STATE.regulated][j]
     drop, rest = rows[state + AIR_STATE.drop][j], fixed[effects + AIR.supply_pressure][j]
     goal = fixed[effects + AIR.gain][j] * target
-    lag = lag_towards(fixed, j, effects, lag, pressure, goal, full)
+    slower = fixed[effects + AIR.exhaust_ratio][j] - 1.0
+    lag = lag * (1.0 + slower if goal < pressure else 1.0)
     reached = regulator_step(pressure, goal, lag, 1.0 / lag, slew, 1.0 / slew, h)
     reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
     reached = pressure if target < 0.0 else reached
@@ -430,8 +472,17 @@ def begin_air(rows: Any, j: int, state: int, pressure: float) -> None:
     rows[state + AIR_STATE.regulated][j] = rows[state + AIR_STATE.line][j] = pressure
     rows[state + AIR_STATE.pilot][j], rows[state + AIR_STATE.pilot_rate][j] = pressure, 0.0
     rows[state + AIR_STATE.opened][j] = rows[state + AIR_STATE.drop][j] = 0.0
+    rows[state + AIR_STATE.lost][j] = 0.0
     rows[state + AIR_STATE.line_rate][j] = rows[state + AIR_STATE.space][j] = 0.0
     rows[state + AIR_STATE.ahead][j] = rows[state + AIR_STATE.slope][j] = 0.0
+
+
+@kernel
+def begin_leak(rows: Any, state: int) -> None:
+    """Begin to count the pressure that the leaks of a tile lose in a control period."""
+    lost = rows[state + AIR_STATE.lost]
+    for j in range(LANES):
+        lost[j] = 0.0
 
 
 @kernel
@@ -444,6 +495,7 @@ def valve_effects_on(fixed: Any, effects: int) -> int:
         + count_on(fixed[effects + AIR.slew_bend], 0.0)
         + count_on(fixed[effects + AIR.slew_ratio], 1.0)
         + count_on(fixed[effects + AIR.pilot_lag], 0.0)
+        + count_on(fixed[effects + AIR.exhaust_taper], 0.0)
     )
     daily = (
         count_on(fixed[effects + AIR.exhaust_ratio], 1.0)
@@ -515,7 +567,10 @@ def air_step(
         pressure[j] = after
     if lines > 0:
         for j in range(LANES):
-            pressure[j] = line_step(
-                rows, fixed, j, state + AIR_STATE.line, effects + AIR.ring_share, own[0][j],
-                pressure[j], width[j],
-            )  # fmt: skip
+            if width[j] > 0.0:
+                pressure[j] = line_step(
+                    rows, fixed, j, state + AIR_STATE.line, effects + AIR.ring_share, own[0][j],
+                    pressure[j], width[j],
+                )  # fmt: skip
+            else:
+                pressure[j] = own[1][j]

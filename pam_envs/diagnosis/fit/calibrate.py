@@ -135,9 +135,7 @@ def regulator(
     full = family.plant.regulator.max_pressure
     named = [f for f in other.base() if f.name.startswith("regulator.") or f.name == CLOCK]
     starts = [
-        tuple(
-            dataclasses.replace(f, start=begin.get(f.name, f.start)) for f in named
-        )
+        tuple(dataclasses.replace(f, start=begin.get(f.name, f.start)) for f in named)
         for begin in (
             {"regulator.conductance": size, "regulator.source_pressure": source}
             for size, source in product(CONDUCTANCES, (1.05 * full, 1.5 * full))
@@ -150,9 +148,7 @@ def regulator(
     return other, flow
 
 
-def _simplest(
-    problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS
-) -> Fit:
+def _simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
     """Return the best of some fits; one with more parameters needs a gain."""
     evaluate(problem, fits)
     improve(problem, fits, rounds, 1e-4)

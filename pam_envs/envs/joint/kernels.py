@@ -21,7 +21,7 @@ from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.pair import advance, command
+from pam_envs.plants.antagonistic_joint.pair import advance, command, leaked_air
 from pam_envs.plants.antagonistic_joint.step import (
     N_WORK,
     SENSED_ANGLE,
@@ -174,7 +174,8 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
         travel = abs(change_of(rows, K.PRESSURE_A, OLD_A, j))
         travel = travel + abs(change_of(rows, K.PRESSURE_B, OLD_B, j))
         work[INFO.effort_pressure_travel][j] = travel
-        work[INFO.effort_air][j] = max(0.0, change_of(rows, K.AIR, OLD_AIR, j))
+        drawn = change_of(rows, K.AIR, OLD_AIR, j) + leaked_air(rows, fixed, j)
+        work[INFO.effort_air][j] = max(0.0, drawn)
 
 
 @routine

@@ -15,7 +15,13 @@ from pam_envs.mechanics.knee_lever import muscle_length
 from pam_envs.parameters import declarations
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.motion import N_WORK
-from pam_envs.plants.knee_orthosis.step import SENSED, advance, begin_lane, replacements
+from pam_envs.plants.knee_orthosis.step import (
+    SENSED,
+    advance,
+    begin_lane,
+    leaked_air,
+    replacements,
+)
 from pam_envs.references import trajectory as T
 from pam_envs.references.trajectory import draw_reference
 from pam_envs.tasks.gait_assistance import BraceTracking
@@ -99,7 +105,13 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
         margin = config[CONFIG.highest_tension] - rows[K.TENSION][j]
         work[INFO.margin_tension][j] = margin
         work[ENDED][j] = 1.0 if margin < 0.0 else 0.0
-        work[INFO.effort_air][j] = max(0.0, change_of(rows, K.AIR, K.OLD_AIR, j))
+        work[INFO.effort_air][j] = air_drawn(rows, fixed, j)
+
+
+@kernel
+def air_drawn(rows: Any, fixed: Any, j: int) -> float:
+    """Return the air [kg] that the muscle of lane ``j`` has drawn since the last call."""
+    return max(0.0, change_of(rows, K.AIR, K.OLD_AIR, j) + leaked_air(rows, fixed, j))
 
 
 @kernel

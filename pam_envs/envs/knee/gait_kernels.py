@@ -9,10 +9,10 @@ from typing import Any
 
 from pam_envs.constants import GRAVITY
 from pam_envs.envs.core.families import Kernels
-from pam_envs.envs.core.kernels import change_of, sense
+from pam_envs.envs.core.kernels import sense
 from pam_envs.envs.core.step import CHOICE, PERIOD
 from pam_envs.envs.knee import gait_layout as L
-from pam_envs.envs.knee.brace_kernels import advance_knee, report_brace
+from pam_envs.envs.knee.brace_kernels import advance_knee, air_drawn, report_brace
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
@@ -263,7 +263,7 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
         broken = min(work[L.INFO.margin_tension][j], work[L.INFO.margin_deviation][j])
         work[L.ENDED][j] = 1.0 if broken < 0.0 else 0.0
         work[L.INFO.effort_over_assistance][j] = over
-        drawn = max(0.0, change_of(rows, K.AIR, K.OLD_AIR, j))
+        drawn = air_drawn(rows, fixed, j)
         work[L.INFO.effort_air][j] = drawn if rows[K.PRESSURE][j] > VENTED else 0.0
 
 

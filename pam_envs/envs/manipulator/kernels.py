@@ -30,7 +30,7 @@ from pam_envs.mechanics.serial_chain.kernels import (
     parameter_rows,
     place_chain,
 )
-from pam_envs.plants.antagonistic_joint.pair import advance, command
+from pam_envs.plants.antagonistic_joint.pair import advance, command, leaked_air
 from pam_envs.plants.core.rollout import start_hysteresis
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.step import (
@@ -160,7 +160,8 @@ def judge_pressures(rows: Any, fixed: Any, config: Any, info: Any, j: int) -> No
     full = 2 * N_STAGES * fixed[M.REGULATOR_MAX_PRESSURE][j]
     report_pressure(info, config, L.INFO, L.CONFIG, higher, moved, full, j)
     info[L.INFO.effort_pressure_travel][j] = travel
-    info[L.INFO.effort_air][j] = max(0.0, change_of(rows, M.AIR, L.OLD_AIR, j))
+    drawn = change_of(rows, M.AIR, L.OLD_AIR, j) + leaked_air(rows, fixed, j)
+    info[L.INFO.effort_air][j] = max(0.0, drawn)
 
 
 @kernel

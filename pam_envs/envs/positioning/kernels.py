@@ -28,6 +28,7 @@ from pam_envs.plants.single_muscle.step import (
     advance,
     begin_effects,
     begin_rest,
+    lost_pressure,
     rest_contraction,
     seen_position,
     seen_pressure,
@@ -71,14 +72,15 @@ write_drive: Any = None  # a placeholder, replaced for each hysteresis
 
 
 @kernel
-def air_in_muscle(rows: Any, fixed: Any, j: int) -> float:
-    """Return the mass of air [kg] in the muscle of lane ``j``."""
+def air_in_muscle(rows: Any, fixed: Any, j: int) -> tuple[float, float]:
+    """Return the mass of air [kg] in the muscle of lane ``j``, and what leaked in this period."""
     length = fixed[R.MUSCLE_REST_LENGTH][j]
     space = volume(
         rows[R.CONTRACTION][j] / length, length, fixed[R.MUSCLE_DIAMETER][j],
         fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j], fixed[R.MUSCLE_AREA_CURVE][j],
     )  # fmt: skip
-    return DENSITY_PER_PRESSURE * (rows[R.PRESSURE][j] + ATMOSPHERE) * space
+    inside = DENSITY_PER_PRESSURE * (rows[R.PRESSURE][j] + ATMOSPHERE) * space
+    return inside, DENSITY_PER_PRESSURE * lost_pressure(rows, j) * space
 
 
 @kernel
@@ -111,9 +113,9 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
         work[INFO.margin_contraction][j] = margin
         work[ENDED][j] = 1.0 if margin < 0.0 else 0.0
         travel = change_of(rows, R.PRESSURE, R.OLD_PRESSURE, j)
-        air = air_in_muscle(rows, fixed, j)
+        air, leaked = air_in_muscle(rows, fixed, j)
         work[INFO.effort_pressure_travel][j] = abs(travel)
-        work[INFO.effort_air][j] = max(0.0, air - rows[R.OLD_AIR][j])
+        work[INFO.effort_air][j] = max(0.0, air - rows[R.OLD_AIR][j] + leaked)
         rows[R.OLD_AIR][j] = air
 
 
@@ -147,7 +149,7 @@ def begin_muscle(
         slide_to_rest(rows, fixed, counts, tables, HYSTERESIS, elements, j)
     fill_ring(rows, R.HISTORY, j, begin)
     rows[R.SET_POINT][j] = rows[R.OLD_SET_POINT][j] = rows[R.OLD_PRESSURE][j] = begin
-    rows[R.OLD_AIR][j] = air_in_muscle(rows, fixed, j)
+    rows[R.OLD_AIR][j], _ = air_in_muscle(rows, fixed, j)
     begin_effects(rows, fixed, j)
     family = choices[CHOICE.reference]
     if family != T.SAMPLES:

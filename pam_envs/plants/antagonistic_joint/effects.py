@@ -7,6 +7,7 @@ plant, which moves by its commands, only the pressures and the sensors have effe
 
 from typing import Any
 
+from pam_envs.constants import DENSITY_PER_PRESSURE
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.pair import (
@@ -26,6 +27,7 @@ from pam_envs.plants.core.muscle_path import (
 )
 from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.pneumatics.enclosed_air import REACHED, air_stiffness, enclose, flows_on
+from pam_envs.pneumatics.regulator import AIR_STATE
 
 FULL_ANGLE, FULL_PRESSURE = 0.5236, 6.5e5
 """Full scales of the sensors [rad, Pa]."""
@@ -90,6 +92,16 @@ def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def leaked_air(rows: Any, fixed: Any, j: int) -> float:
+    """Return the air [kg] that leaked from all muscles of lane ``j`` in this control period."""
+    leaked = 0.0
+    for m in range(2 * N_PAIRS):
+        lost = rows[path_of(m) + PATH_STATE.air + AIR_STATE.lost][j]
+        leaked = leaked + lost * volume_of(fixed, j, rows[PAIR.contraction + m][j])
+    return DENSITY_PER_PRESSURE * leaked
+
+
+@kernel
 def enclosed_stiffness(rows: Any, j: int, m: int) -> float:
     """Return the stiffness [N m/rad] of the air in muscle ``m`` of lane ``j``."""
     return air_stiffness(rows, j, path_of(m) + PATH_STATE.air)
@@ -132,5 +144,5 @@ def pair_kernels(kind: str, layout: Any, pairs: int, effects: int | None) -> dic
     )  # fmt: skip
     begin = begin_paths_and_bearing if "bearing" in block._fields else begin_paths
     air = {"settle_air": settle_air, "begin_enclosed": begin_enclosed}
-    air["enclosed_stiffness"] = enclosed_stiffness
+    air |= {"enclosed_stiffness": enclosed_stiffness, "leaked_air": leaked_air}
     return found | shown | air | {"regulate": regulate_extended, "begin_muscles": begin}

@@ -94,6 +94,12 @@ def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def leaked_air(rows: Any, fixed: Any, j: int) -> float:
+    """Return the air [kg] that leaked in this control period: a plain plant has no leak."""
+    return 0.0
+
+
+@kernel
 def enclosed_stiffness(rows: Any, j: int, m: int) -> float:
     """Return the stiffness [N m/rad] of the air in muscle ``m``: none in a plain plant."""
     return 0.0

@@ -16,6 +16,7 @@ from pam_envs.hysteresis.friction_effects import (
     CreepEffects,
     FirstCycles,
     begin_creep,
+    creep_left,
     creep_step,
     newness,
 )
@@ -30,6 +31,7 @@ from pam_envs.pneumatics.regulator import (
     RegulatorEffects,
     air_step,
     begin_air,
+    begin_leak,
     delay_commands,
     late_shares,
     line_effects_on,
@@ -40,9 +42,10 @@ from pam_envs.pneumatics.regulator import (
 
 REGULATOR = named_rows("max_pressure", "dead_time", "time_constant", "slew_rate")
 """Rows of a regulator's plain parameters, from the first."""
-DELAYED = row_blocks(commands=N_HISTORY, older=1, newer=1, switch=1)
+DELAYED = row_blocks(commands=N_HISTORY, older=1, newer=1, switch=1, per_lag=1, per_slew=1)
 """State of a dead time, from its first row: the last setpoints; the two that take effect in a
-control period [Pa], and the time between them [s]."""
+control period [Pa], and the time between them [s]. Then the reciprocals of time constant and slew
+rate, of a regulator without effects."""
 PATH = parameter_rows(RegulatorEffects, CreepEffects, FirstCycles)
 """Rows of the effects that all muscles of a plant share, from the first."""
 WARM = parameter_rows(TemperatureEffects)
@@ -87,19 +90,33 @@ def follow_set_point(
     ``delayed`` and ``plain`` are the first rows of the dead time's state (``DELAYED``) and of the
     regulator (``REGULATOR``); ``pressure``, ``set_point`` [Pa] and ``step`` are rows.
     """
+    lag, slew = fixed[plain + REGULATOR.time_constant], fixed[plain + REGULATOR.slew_rate]
+    per_lag, per_slew = rows[delayed + DELAYED.per_lag], rows[delayed + DELAYED.per_slew]
     if i == 0:
         delay(rows, fixed, delayed, plain, set_point, step, period)
-    lag, slew = fixed[plain + REGULATOR.time_constant], fixed[plain + REGULATOR.slew_rate]
+        for j in range(LANES):
+            per_lag[j] = 1.0 / lag[j]
+        for j in range(LANES):
+            per_slew[j] = 1.0 / slew[j]
     own = scratch(2, LANES)
     late, width = own[0], own[1]
     late_shares(rows[delayed + DELAYED.switch], i, substeps, period, late)
+    earlier = count_on(late, 1.0)  # lanes whose newer setpoint is not yet in effect, or in part
+    if earlier == 0 or count_on(late, 0.0) == 0:  # one setpoint in all lanes
+        target = rows[delayed + (DELAYED.newer if earlier == 0 else DELAYED.older)]
+        for j in range(LANES):
+            pressure[j] = regulator_step(
+                pressure[j], max(0.0, target[j]), lag[j], per_lag[j], slew[j], per_slew[j],
+                period / substeps,
+            )  # fmt: skip
+        return
     for stage in range(2):  # towards the older setpoint, then towards the newer one
         if stage_widths(late, stage, period / substeps, width) == 0:
             continue
         target = rows[delayed + (DELAYED.newer if stage == 1 else DELAYED.older)]
         for j in range(LANES):
             reached = regulator_step(
-                pressure[j], max(0.0, target[j]), lag[j], 1.0 / lag[j], slew[j], 1.0 / slew[j],
+                pressure[j], max(0.0, target[j]), lag[j], per_lag[j], slew[j], per_slew[j],
                 width[j],
             )  # fmt: skip
             pressure[j] = reached if width[j] > 0.0 else pressure[j]
@@ -117,6 +134,7 @@ def path_air(
     """
     if i == 0:
         delay(rows, fixed, delayed, plain, set_point, step, period)
+        begin_leak(rows, state + PATH_STATE.air)
     own = scratch(4, LANES)
     late, width = own[2], own[3]
     full, lag, slew = (
@@ -175,14 +193,15 @@ def path_muscle(
     ``warm`` is the first row of the muscle's temperature (``WARM``), ``pressure`` are those after
     ``h`` seconds; otherwise see :func:`path_air`.
     """
-    width = scratch(1, LANES)
+    own = scratch(5, LANES)
     for j in range(LANES):
-        width[0][j] = h
+        own[4][j] = h
         crept[j] = 0.0
         factor[j] = 1.0
+    creep_left(fixed, effects + PATH.creep_1, effects + PATH.creep_time_1, 0, LANES, own[4], own)
     creep_step(
-        rows, fixed, state + PATH_STATE.creep, effects + PATH.creep_1, effects + PATH.creep_time_1,
-        0, LANES, pressure, width[0], crept,
+        rows, fixed, state + PATH_STATE.creep, effects + PATH.creep_1, 0, LANES, pressure, own,
+        crept,
     )  # fmt: skip
     if factors_on(fixed, effects, warm) > 0:
         for j in range(LANES):

@@ -130,14 +130,19 @@ def settle_regulated(rows: Any, fixed: Any, h: float, work: Any) -> None:
     for side in range(2):
         for j in range(LANES):
             rows[K.PRESSURE_A + side][j] = work[NOW_A + side][j]
-            count_used_air(rows, fixed, j, side)
+            count_used_air(rows, fixed, j, side, 0.0)
 
 
 @kernel
-def count_used_air(rows: Any, fixed: Any, j: int, side: int) -> None:
-    """Write the air [kg] in a bundle, and add its growth to the air used."""
-    air = air_at(rows, fixed, j, side)
-    rows[K.USED][j] = rows[K.USED][j] + max(0.0, air - rows[K.AIR_A + side][j])
+def count_used_air(rows: Any, fixed: Any, j: int, side: int, lost: float) -> None:
+    """Write the air [kg] in a bundle, and add its growth and its leak to the air used.
+
+    ``lost`` is the pressure [Pa] that leaked since the last call.
+    """
+    space = volume_of(fixed, j, side, contraction_at(fixed, j, side, rows[K.ANGLE][j]))
+    air = (rows[K.PRESSURE_A + side][j] + ATMOSPHERE) * space / PRESSURE_PER_DENSITY
+    leaked = lost * space / PRESSURE_PER_DENSITY
+    rows[K.USED][j] = rows[K.USED][j] + max(0.0, air - rows[K.AIR_A + side][j] + leaked)
     rows[K.AIR_A + side][j] = air
 
 

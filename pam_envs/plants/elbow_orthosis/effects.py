@@ -121,8 +121,10 @@ def settle_regulated(rows: Any, fixed: Any, h: float, work: Any) -> None:
                 travel = ahead * fixed[K.PULLEY_RADIUS][j] * rows[K.VELOCITY][j]
                 enclose_air(rows, fixed, j, side, 0.5 * h * travel)
             path_squeeze(rows, fixed, path_of(side), K.EFFECT.path, pressure, effective, REACHED)
+        lost = rows[path_of(side) + PATH_STATE.air + AIR_STATE.lost]
         for j in range(LANES):
-            count_used_air(rows, fixed, j, side)
+            count_used_air(rows, fixed, j, side, lost[j])
+            lost[j] = 0.0
 
 
 @kernel

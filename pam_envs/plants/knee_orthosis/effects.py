@@ -7,6 +7,7 @@ sticks and slips, and all sensors have their effects.
 
 from typing import Any
 
+from pam_envs.constants import DENSITY_PER_PRESSURE
 from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, scratch
 from pam_envs.mechanics.knee_lever import muscle_length
@@ -21,7 +22,7 @@ from pam_envs.plants.core.muscle_path import (
 from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.pneumatics.enclosed_air import AHEAD, REACHED, air_stiffness, enclose, flows_on
-from pam_envs.pneumatics.regulator import AIR
+from pam_envs.pneumatics.regulator import AIR, AIR_STATE
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 plain_regulate: Any = None  # placeholders: the dynamics of the pressure of the plain plant, and the
@@ -135,6 +136,19 @@ def enclosed_stiffness(rows: Any, j: int) -> float:
 
 
 @kernel
+def leaked_air(rows: Any, fixed: Any, j: int) -> float:
+    """Return the air [kg] that leaked from the muscle of lane ``j`` in this control period."""
+    space = gas_volume(
+        rows[K.LENGTH][j],
+        fixed[K.MUSCLE_SHORTEST_LENGTH][j],
+        fixed[K.MUSCLE_STIFFNESS_RATIO][j],
+        fixed[K.MUSCLE_FULL_VOLUME][j],
+    )
+    lost = rows[EFFECTS_AT + K.STATE.path + PATH_STATE.air + AIR_STATE.lost][j]
+    return DENSITY_PER_PRESSURE * lost * space
+
+
+@kernel
 def regulate_as_measured(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float
 ) -> None:
@@ -193,4 +207,5 @@ def muscle_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
         "settle_air": settle_air,
         "begin_enclosed": begin_enclosed,
         "enclosed_stiffness": enclosed_stiffness,
+        "leaked_air": leaked_air,
     }

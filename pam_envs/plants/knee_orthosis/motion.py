@@ -13,8 +13,8 @@ from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE, GRAVITY
 from pam_envs.hysteresis.slip import LIMIT
-from pam_envs.kernels.arithmetic import decay, sine_and_cosine
-from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.kernels.arithmetic import count_on, decay, sine_and_cosine
+from pam_envs.kernels.build import LANES, kernel, routine, scratch
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.kernels.random import uniform
 from pam_envs.mechanics.guide import turn
@@ -28,6 +28,7 @@ from pam_envs.mechanics.leg import (
 )
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.muscle.gas_spring import gas_volume, spring_tension, stretch_of
+from pam_envs.parameters import named_rows
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.hysteresis import REFERENCE_PRESSURE
 from pam_envs.references.gait import (
@@ -56,30 +57,56 @@ def varied(fixed: Any, counts: Any, parameter: int, stream: int, stride: int, j:
 
 
 @kernel
-def stride_at(
-    rows: Any, fixed: Any, counts: Any, j: int, time: float
-) -> tuple[float, float, float, float]:
+def turns_at(rows: Any, fixed: Any, j: int, time: float) -> float:
+    """Return the number of strides since the phase 0 before the start, at a time [s]."""
+    return rows[K.START_PHASE][j] + time / fixed[K.STRIDE_TIME][j]  # type: ignore[no-any-return]
+
+
+@routine
+def draw_stride(rows: Any, fixed: Any, counts: Any, j: int, time: float) -> None:
+    """Draw the stride of lane ``j`` at a time [s]: how early it begins and its load."""
+    number = int(turns_at(rows, fixed, j, time))
+    rows[K.STRIDE_NUMBER][j] = number
+    rows[K.EARLY][j] = HALF_ROOT * varied(
+        fixed, counts, K.STRIDE_VARIABILITY, STRIDE_STREAM, number, j
+    )
+    rows[K.NEXT_EARLY][j] = HALF_ROOT * varied(
+        fixed, counts, K.STRIDE_VARIABILITY, STRIDE_STREAM, number + 1, j
+    )
+    rows[K.HEAVY][j] = varied(
+        fixed, counts, K.STRIDE_LOAD_VARIABILITY, STRIDE_STREAM + 1, number, j
+    )
+    rows[K.NEXT_HEAVY][j] = varied(
+        fixed, counts, K.STRIDE_LOAD_VARIABILITY, STRIDE_STREAM + 1, number + 1, j
+    )
+
+
+@kernel
+def draw_strides(
+    rows: Any, fixed: Any, counts: Any, per_period: float, offset: float, h: float
+) -> None:
+    """Draw the strides that a tile has begun, ``offset`` parts of ``h`` seconds into a period."""
+    begun = 0
+    for j in range(LANES):
+        time = (counts[K.STEP][j] * per_period + offset) * h
+        number = int(turns_at(rows, fixed, j, time))
+        begun = begun + (0 if rows[K.STRIDE_NUMBER][j] == number else 1)
+    for j in range(LANES if begun > 0 else 0):
+        time = (counts[K.STEP][j] * per_period + offset) * h
+        if rows[K.STRIDE_NUMBER][j] != int(turns_at(rows, fixed, j, time)):
+            draw_stride(rows, fixed, counts, j, time)
+
+
+@kernel
+def stride_at(rows: Any, fixed: Any, j: int, time: float) -> tuple[float, float, float, float]:
     """Return the phase, 0 to 1, its rates [1/s, 1/s2] and the factor on the load at a time [s].
 
     Strides begin early or late by random shares of a stride, and go smoothly from one to the next.
+    They are drawn before (:func:`draw_strides`).
     """
     pace = 1.0 / fixed[K.STRIDE_TIME][j]
-    turns = rows[K.START_PHASE][j] + time / fixed[K.STRIDE_TIME][j]
+    turns = turns_at(rows, fixed, j, time)
     number = int(turns)
-    if rows[K.STRIDE_NUMBER][j] != number:
-        rows[K.STRIDE_NUMBER][j] = number
-        rows[K.EARLY][j] = HALF_ROOT * varied(
-            fixed, counts, K.STRIDE_VARIABILITY, STRIDE_STREAM, number, j
-        )
-        rows[K.NEXT_EARLY][j] = HALF_ROOT * varied(
-            fixed, counts, K.STRIDE_VARIABILITY, STRIDE_STREAM, number + 1, j
-        )
-        rows[K.HEAVY][j] = varied(
-            fixed, counts, K.STRIDE_LOAD_VARIABILITY, STRIDE_STREAM + 1, number, j
-        )
-        rows[K.NEXT_HEAVY][j] = varied(
-            fixed, counts, K.STRIDE_LOAD_VARIABILITY, STRIDE_STREAM + 1, number + 1, j
-        )
     early, heavy = rows[K.EARLY][j], rows[K.HEAVY][j]
     gain, growth = rows[K.NEXT_EARLY][j] - early, rows[K.NEXT_HEAVY][j] - heavy
     u = turns - float(number)
@@ -93,15 +120,46 @@ def stride_at(
     )
 
 
-@routine
-def gait_at(rows: Any, fixed: Any, counts: Any, gait: Any, j: int, time: float) -> None:
-    """Write the stride of one lane at a time [s]: path, ground, demand, hold."""
-    phase, pace, hurry, heavy = stride_at(rows, fixed, counts, j, time)
-    knee, knee_turn, knee_bend = curve_and_rates(gait, KNEE, phase)
-    lean, lean_turn, lean_bend = curve_and_rates(gait, SHANK, phase)
-    weight = fixed[K.LEG_BODY_MASS][j] * GRAVITY * heavy
+READ = named_rows(
+    *("phase", "pace", "hurry", "heavy", "knee", "knee_turn", "knee_bend", "lean", "lean_turn"),
+    *("lean_bend", "ankle", "loaded", "leaning", "cop"),
+)
+"""Rows of what :func:`read_gait` reads."""
+N_READ = len(READ)
+
+
+@kernel
+def read_gait(rows: Any, fixed: Any, gait: Any, j: int, time: float, read: Any) -> None:
+    """Write phase and curves of one lane's stride at a time [s] to the scratch ``read``."""
+    phase, pace, hurry, heavy = stride_at(rows, fixed, j, time)
+    read[READ.phase][j], read[READ.pace][j] = phase, pace
+    read[READ.hurry][j], read[READ.heavy][j] = hurry, heavy
+    knee = curve_and_rates(gait, KNEE, phase)
+    read[READ.knee][j], read[READ.knee_turn][j], read[READ.knee_bend][j] = knee
+    lean = curve_and_rates(gait, SHANK, phase)
+    read[READ.lean][j], read[READ.lean_turn][j], read[READ.lean_bend][j] = lean
+    read[READ.ankle][j] = curve(gait, ANKLE, phase)
+    read[READ.loaded][j] = vertical_load(gait, phase, NATURAL_STRIDE / fixed[K.STRIDE_TIME][j])
+    read[READ.leaning][j], read[READ.cop][j] = curve(gait, GROUND_X, phase), curve(gait, COP, phase)
+
+
+@kernel
+def gait_at(rows: Any, fixed: Any, j: int, read: Any) -> None:
+    """Write the stride of one lane from its curves (:class:`READ`): path, ground, demand, hold."""
+    phase, pace, hurry = read[READ.phase][j], read[READ.pace][j], read[READ.hurry][j]
+    knee, knee_turn, knee_bend = (
+        read[READ.knee][j],
+        read[READ.knee_turn][j],
+        read[READ.knee_bend][j],
+    )
+    lean, lean_turn, lean_bend = (
+        read[READ.lean][j],
+        read[READ.lean_turn][j],
+        read[READ.lean_bend][j],
+    )
+    weight = fixed[K.LEG_BODY_MASS][j] * GRAVITY * read[READ.heavy][j]
     quick = NATURAL_STRIDE / fixed[K.STRIDE_TIME][j]
-    loaded = vertical_load(gait, phase, quick)
+    loaded, leaning = read[READ.loaded][j], read[READ.leaning][j]
     knee_bend = knee_bend * pace * pace + knee_turn * hurry
     lean_bend = lean_bend * pace * pace + lean_turn * hurry
     rows[K.PHASE][j] = phase
@@ -109,12 +167,11 @@ def gait_at(rows: Any, fixed: Any, counts: Any, gait: Any, j: int, time: float) 
     rows[K.KNEE_RATE][j] = knee_turn * pace
     rows[K.KNEE_ACCELERATION][j] = knee_bend
     rows[K.SHANK][j] = lean
-    rows[K.ANKLE][j] = curve(gait, ANKLE, phase)
+    rows[K.ANKLE][j] = read[READ.ankle][j]
     rows[K.GROUND_Z][j] = weight * loaded
-    leaning = curve(gait, GROUND_X, phase)
     rows[K.GROUND_X][j] = weight * leaning * quick * quick
     rows[K.COP][j] = centre_of_pressure(
-        curve(gait, COP, phase),
+        read[READ.cop][j],
         leaning,
         loaded,
         quick,
@@ -220,6 +277,13 @@ def learn(rows: Any, fixed: Any, j: int, period: float) -> None:
 
 
 @kernel
+def unsaved(rows: Any, j: int) -> tuple[float, float]:
+    """Return the torques [N m] that extensors and flexors bear where the wearer does not adapt."""
+    demand, torque = rows[K.DEMAND][j], rows[K.TORQUE][j]
+    return demand - torque, torque - demand
+
+
+@kernel
 def borne(rows: Any, fixed: Any, j: int) -> tuple[float, float]:
     """Return the torques [N m] that extensors and flexors bear.
 
@@ -229,7 +293,7 @@ def borne(rows: Any, fixed: Any, j: int) -> tuple[float, float]:
     """
     demand, torque = rows[K.DEMAND][j], rows[K.TORQUE][j]
     if fixed[K.LEG_ADAPTATION][j] == 0.0:
-        return demand - torque, torque - demand
+        return unsaved(rows, j)
     expected = torque_expected(rows, fixed, j, rows[K.PHASE][j])
     planned, half = demand - expected, 0.5 * (torque - expected)
     extend, flex = max(0.0, planned) - half, max(0.0, -planned) + half
@@ -237,12 +301,14 @@ def borne(rows: Any, fixed: Any, j: int) -> tuple[float, float]:
 
 
 @kernel
-def share_muscles(rows: Any, fixed: Any, j: int, period: float) -> None:
-    """Advance the activations, with the orthosis' torque as delivered and without it."""
+def share_muscles(rows: Any, fixed: Any, j: int, period: float, extend: float, flex: float) -> None:
+    """Advance the activations, with the orthosis' torque as delivered and without it.
+
+    ``extend`` and ``flex`` [N m] are the torques that extensors and flexors bear with it.
+    """
     risen = left_of_gap(period, fixed[K.ACTIVATION_RISE_TIME][j])
     fallen = left_of_gap(period, fixed[K.ACTIVATION_FALL_TIME][j])
     demand = rows[K.DEMAND][j]
-    extend, flex = borne(rows, fixed, j)
     rows[K.QUADS][j] = activation(rows[K.QUADS][j], excite(fixed, j, extend), risen, fallen)
     rows[K.FLEXORS][j] = activation(rows[K.FLEXORS][j], excite(fixed, j, flex), risen, fallen)
     free = excite(fixed, j, demand)
@@ -261,9 +327,12 @@ HALF_ROOT = 0.7071067811865476
 """Deviation of a stride's begin over that of its duration, which has two such ends."""
 STRIDE_STREAM = 20
 """Random stream of the strides' begins; the next one is that of their loads."""
-WAS, HELD, HELD_RATE, KNEE_WAS, RATE_WAS, FORCE_WAS = range(6)
-"""Rows of scratch: stiffness before the sub-step, then the wearer's hold and path."""
-N_WORK = 6
+WAS, HELD, HELD_RATE, KNEE_WAS, RATE_WAS, FORCE_WAS, KNEE_NOW, RATE_NOW, FORCE_NOW, EXPECTS = range(
+    10
+)
+"""Rows of scratch: stiffness before the sub-step, the wearer's hold, his path before and after the
+sub-step, and the assistance that he expects."""
+N_WORK = 10
 
 
 # placeholders, filled in for each hysteresis and mounting
@@ -271,6 +340,7 @@ hysteresis_lag: Any = None
 hysteresis_peek: Any = None
 feel_at: Any = None
 angle_ahead: Any = None
+report: Any = None
 EFFECTIVE = K.PRESSURE
 """Row of the effective pressure; that of the extended plant replaces it."""
 
@@ -441,11 +511,15 @@ def begin_period_leg(
     rows: Any, fixed: Any, counts: Any, gait: Any, period: float, work: Any
 ) -> None:
     """Read the wearer's path at the end of the period and the stiffness with which he holds it."""
+    draw_strides(rows, fixed, counts, 1, 1, period)
+    read = scratch(N_READ, LANES)
+    for j in range(LANES):
+        read_gait(rows, fixed, gait, j, (counts[K.STEP][j] + 1) * period, read)
     for j in range(LANES):
         stiffness, damping = rows[K.HOLD][j], rows[K.HOLD_RATE][j]
         work[KNEE_WAS][j], work[RATE_WAS][j] = rows[K.KNEE][j], rows[K.KNEE_RATE][j]
         work[FORCE_WAS][j] = rows[K.KNEE_ACCELERATION][j]
-        gait_at(rows, fixed, counts, gait, j, (counts[K.STEP][j] + 1) * period)
+        gait_at(rows, fixed, j, read)
         work[HELD][j] = 0.5 * (stiffness + rows[K.HOLD][j])
         work[HELD_RATE][j] = 0.5 * (damping + rows[K.HOLD_RATE][j])
 
@@ -462,11 +536,20 @@ def follow_leg(
         work[WAS],
     )
     held, held_rate, mount = work[HELD], work[HELD_RATE], fixed[K.LEVER_MOUNT_ANGLE]
-    for j in range(LANES):
+    draw_strides(rows, fixed, counts, per_substep, i + 1, h)
+    adapts = count_on(fixed[K.LEG_ADAPTATION], 0.0)
+    for j in range(LANES):  # a loop of its own: it reads the curves and writes scratch alone
         time = (counts[K.STEP][j] * per_substep + (i + 1)) * h
-        phase, pace, hurry, _ = stride_at(rows, fixed, counts, j, time)
+        phase, pace, hurry, _ = stride_at(rows, fixed, j, time)
         knee, turn, bend = curve_and_rates(gait, KNEE, phase)
-        turn, bend = turn * pace, bend * pace * pace + turn * hurry
+        work[KNEE_NOW][j], work[RATE_NOW][j] = knee, turn * pace
+        work[FORCE_NOW][j] = bend * pace * pace + turn * hurry
+        work[EXPECTS][j] = phase
+    for j in range(LANES):
+        expected = torque_expected(rows, fixed, j, work[EXPECTS][j]) if adapts > 0 else 0.0
+        work[EXPECTS][j] = expected
+    for j in range(LANES):
+        knee, turn, bend = work[KNEE_NOW][j], work[RATE_NOW][j], work[FORCE_NOW][j]
         ahead, per_inertia = (
             0.5 * h * rate[j],
             1.0 / (fixed[K.LEG_INERTIA][j] + fixed[K.LEVER_INERTIA][j]),
@@ -478,7 +561,7 @@ def follow_leg(
         old = old + along_path(fixed, j, work[RATE_WAS][j], work[FORCE_WAS][j])
         old = old - habituated(fixed, j, work[KNEE_WAS][j])
         new = new + along_path(fixed, j, turn, bend) - habituated(fixed, j, knee)
-        own = rows[K.REFLEX][j] - torque_expected(rows, fixed, j, phase)
+        own = rows[K.REFLEX][j] - work[EXPECTS][j]
         old, new = old + own, new + own
         slope = 0.5 * (slope_old + slope_new) + enclosed_stiffness(rows, j)
         du, rate[j] = damped_motion(
@@ -534,6 +617,13 @@ def report_alone(rows: Any, fixed: Any, j: int, period: float) -> None:
 
 
 @kernel
+def report_each(rows: Any, fixed: Any, period: float) -> None:
+    """Write the signals of a tile."""
+    for j in range(LANES):
+        report(rows, fixed, j, period)
+
+
+@kernel
 def report_rig(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Write the signals of a muscle held at its length."""
     report_muscle(rows, fixed, j, fixed[K.FIXTURE_LENGTH][j])
@@ -543,25 +633,48 @@ def report_rig(rows: Any, fixed: Any, j: int, period: float) -> None:
 @kernel
 def report_leg(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Write the signals of the brace on the leg, and the wearer's muscle activity."""
+    place_leg(rows, fixed, j, period)
+    expected = torque_expected(rows, fixed, j, rows[K.PHASE][j])
+    rows[K.TORQUE][j] = delivered(rows, fixed, j, rows[K.TORQUE][j], expected)
+    learn(rows, fixed, j, period)
+    extend, flex = borne(rows, fixed, j)
+    share_muscles(rows, fixed, j, period, extend, flex)
+
+
+@kernel
+def report_legs(rows: Any, fixed: Any, period: float) -> None:
+    """Write the signals of a tile; where no wearer adapts, the same by fewer operations."""
+    if count_on(fixed[K.LEG_ADAPTATION], 0.0) > 0:
+        for j in range(LANES):
+            report_leg(rows, fixed, j, period)
+        return
+    for j in range(LANES):
+        place_leg(rows, fixed, j, period)
+        rows[K.TORQUE][j] = delivered(rows, fixed, j, rows[K.TORQUE][j], 0.0)
+        extend, flex = unsaved(rows, j)
+        share_muscles(rows, fixed, j, period, extend, flex)
+
+
+@kernel
+def place_leg(rows: Any, fixed: Any, j: int, period: float) -> None:
+    """Write angle, velocity, length, tension and torque of the brace on the leg."""
     rate = rows[K.KNEE_RATE][j] + rows[K.DEVIATION_RATE][j]
     angle = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j] + rows[K.DEVIATION][j]
     rows[K.ANGLE][j], rows[K.VELOCITY][j] = angle, rate
     report_alone(rows, fixed, j, period)
-    rows[K.TORQUE][j] = delivered(rows, fixed, j, rows[K.TORQUE][j])
-    learn(rows, fixed, j, period)
-    share_muscles(rows, fixed, j, period)
 
 
 @kernel
-def delivered(rows: Any, fixed: Any, j: int, torque: float) -> float:
+def delivered(rows: Any, fixed: Any, j: int, torque: float, expected: float) -> float:
     """Return the part of the torque of spring and muscle [N m] that reaches the leg.
 
-    The rest moves the brace itself, against its inertia and friction.
+    The rest moves the brace itself, against its inertia and friction. ``expected`` [N m] is what
+    an adaptive wearer expects.
     """
     path = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
     off, rate = rows[K.DEVIATION][j], rows[K.DEVIATION_RATE][j]
     drag = (rows[K.HOLD_RATE][j] + fixed[K.LEVER_DAMPING][j]) * rate
-    own = rows[K.REFLEX][j] - torque_expected(rows, fixed, j, rows[K.PHASE][j])
+    own = rows[K.REFLEX][j] - expected
     pull = torque + path - habituated(fixed, j, rows[K.KNEE][j]) + rows[K.HOLD][j] * off + drag
     pull = pull + own
     sway = -pull / (fixed[K.LEG_INERTIA][j] + fixed[K.LEVER_INERTIA][j])
@@ -612,11 +725,14 @@ def rest_leg(
     j: int,
 ) -> None:  # fmt: skip
     """Put the knee where the wearer's hold balances the brace, moving along the path."""
-    rows[K.STRIDE_NUMBER][j], rows[K.REFLEX][j] = -1.0, 0.0
+    rows[K.REFLEX][j] = 0.0
     rows[K.FELT][j], rows[K.FELT_COUNT][j], rows[K.FELT_PART][j] = 0.0, 0.0, 0.0
     for k in range(BINS):
         rows[K.EXPECTED + k][j] = 0.0
-    gait_at(rows, fixed, counts, gait, j, 0.0)
+    draw_stride(rows, fixed, counts, j, 0.0)
+    read = scratch(N_READ, LANES)
+    read_gait(rows, fixed, gait, j, 0.0, read)
+    gait_at(rows, fixed, j, read)
     load = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
     load = load - habituated(fixed, j, rows[K.KNEE][j])
     angle = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j]
@@ -640,6 +756,7 @@ MOTIONS: dict[str, dict[str, Any]] = {
         "rest": rest_rig,
         "angle_ahead": brace_ahead,
         "report": report_rig,
+        "report_tile": report_each,
     },
     "no_load": {
         "begin_period": begin_period_alone,
@@ -647,6 +764,7 @@ MOTIONS: dict[str, dict[str, Any]] = {
         "rest": rest_alone,
         "angle_ahead": brace_ahead,
         "report": report_alone,
+        "report_tile": report_each,
     },
     "leg": {
         "begin_period": begin_period_leg,
@@ -654,5 +772,6 @@ MOTIONS: dict[str, dict[str, Any]] = {
         "rest": rest_leg,
         "angle_ahead": leg_ahead,
         "report": report_leg,
+        "report_tile": report_legs,
     },
 }

@@ -39,6 +39,7 @@ start_friction: Any = None
 settle_friction: Any = None
 rest: Any = None
 report: Any = None
+report_tile: Any = None
 SENSED = (K.TENSION, K.ANGLE, K.PRESSURE, K.HEEL, K.GROUND_Z, K.COP, K.ANKLE)
 """Rows of undisturbed readings, in the order of ``SENSORS``; effects replace them."""
 EFFECTIVE = K.PRESSURE
@@ -145,6 +146,12 @@ def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def leaked_air(rows: Any, fixed: Any, j: int) -> float:
+    """Return the air [kg] that leaked in this control period: a plain plant has no leak."""
+    return 0.0
+
+
+@kernel
 def lag(rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float) -> None:
     """Advance the pressure behind dead time, rate limit and first-order lag."""
     follow_set_point(
@@ -209,8 +216,7 @@ def advance(
         move(rows, fixed, counts, gait, i, substeps, h, work)
         settle_air(rows, fixed, h, work)
         slide(rows, fixed, counts, table, hysteresis, elements, 0.0, work)
-    for j in range(LANES):
-        report(rows, fixed, j, period)
+    report_tile(rows, fixed, period)
     read_sensors(rows, fixed, counts[K.STEP], period)
 
 

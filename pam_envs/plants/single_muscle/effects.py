@@ -17,6 +17,7 @@ from typing import Any
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.friction_effects import (
     begin_creep,
+    creep_left,
     creep_step,
     creeps_on,
     friction_with_effects,
@@ -27,7 +28,7 @@ from pam_envs.kernels.build import LANES, kernel, routine, scratch
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.guide import stick_slip_step
 from pam_envs.mechanics.hanging_mass import MOUNT_STATE, load_fraction, mount_step
-from pam_envs.muscle.effective_area import law_and_slope, volume
+from pam_envs.muscle.effective_area import law_and_slope, tension, tension_slope, volume
 from pam_envs.muscle.effects import (
     map_force,
     map_on,
@@ -54,12 +55,16 @@ from pam_envs.pneumatics.enclosed_air import (
 )
 from pam_envs.pneumatics.regulator import (
     AIR,
+    AIR_STATE,
     air_step,
     begin_air,
+    begin_leak,
     delay_commands,
+    interval_of,
     late_shares,
     line_effects_on,
     stage_widths,
+    switch_substeps,
     valve_effects_on,
 )
 
@@ -83,22 +88,27 @@ FINE_PARTS = 4
 @kernel
 def effective_pressure(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
-    elements: int, work: Any, width: Any, own: Any, creeps: int, worn: int,
+    elements: int, work: Any, left: Any, own: Any, creeps: int, worn: int,
 ) -> None:  # fmt: skip
-    """Compute the effective pressure from the pressure, ``width`` seconds after the last time."""
+    """Compute the effective pressure from the pressure; ``left`` is that of the creep's step."""
     pressure, drive = rows[R.PRESSURE], rows[R.DRIVE]
     true, friction, most = own[0], rows[EFFECTS_AT + S.friction], own[2]
-    for j in range(first, last):
-        true[j] = pressure[j]
-        pressure[j] = max(0.0, pressure[j] - fixed[R.HYSTERESIS_THRESHOLD][j])
-    plain_hysteresis(rows, fixed, counts, table, hysteresis, first, last, elements, work)
-    for j in range(first, last):
-        above = pressure[j]
-        pressure[j] = true[j]
-        friction[j] = above - drive[j]
-        drive[j] = above - friction[j]
-        true[j] = above
-        most[j] = 0.0
+    if STAGED > 0:
+        for j in range(first, last):
+            true[j] = pressure[j]
+            pressure[j] = max(0.0, pressure[j] - fixed[R.HYSTERESIS_THRESHOLD][j])
+        plain_hysteresis(rows, fixed, counts, table, hysteresis, first, last, elements, work)
+        for j in range(first, last):
+            above = pressure[j]
+            pressure[j] = true[j]
+            friction[j] = above - drive[j]
+            drive[j] = above - friction[j]
+            true[j] = above
+            most[j] = 0.0
+    else:
+        for j in range(first, last):
+            true[j] = drive[j] = max(0.0, pressure[j] - fixed[R.HYSTERESIS_THRESHOLD][j])
+            friction[j] = most[j] = 0.0
     for k in range(elements if worn > 0 else 0):
         for j in range(first, last):
             most[j] = most[j] + fixed[R.WEIGHT + k][j] * fixed[R.THRESHOLD + k][j]
@@ -117,9 +127,8 @@ def effective_pressure(
         for j in range(first, last):
             most[j] = 0.0
         creep_step(
-            rows, fixed, EFFECTS_AT + S.creep, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1,
-            first, last, drive, width, most,
-        )  # fmt: skip
+            rows, fixed, EFFECTS_AT + S.creep, R.HYSTERESIS_CREEP_1, first, last, drive, left, most
+        )
         for j in range(first, last):
             drive[j] = drive[j] + most[j]
     for j in range(first, last if worn > 0 else first):
@@ -161,12 +170,13 @@ def settled(
     elements: int, work: Any,
 ) -> None:  # fmt: skip
     """Compute the effective pressure of a pressure that has been held for long."""
-    own = scratch(3, LANES)
+    own, left = scratch(3, LANES), scratch(4, LANES)
     for j in range(first, last):
         own[1][j] = 1e9
         rows[EFFECTS_AT + S.kelvin][j] = fixed[R.MUSCLE_TEMPERATURE][j]
+    creep_left(fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, first, last, own[1], left)
     effective_pressure(
-        rows, fixed, counts, table, hysteresis, first, last, elements, work, own[1], own, 1, 1
+        rows, fixed, counts, table, hysteresis, first, last, elements, work, left, own, 1, 1
     )
 
 
@@ -309,15 +319,102 @@ def seen_pressure(rows: Any, j: int) -> float:
 
 
 @kernel
-def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, maps: int) -> None:
+def lost_pressure(rows: Any, j: int) -> float:
+    """Return the pressure [Pa] that leaked in this control period."""
+    return rows[EFFECTS_AT + S.air + AIR_STATE.lost][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def finer_terms_on(fixed: Any) -> int:
+    """Return the number of lanes and terms of law, load and loss that a plain plant has not."""
+    return (  # type: ignore[no-any-return]
+        count_on(fixed[R.MUSCLE_AREA_CURVE], 0.0)
+        + count_on(fixed[R.MUSCLE_SOFTENING], 0.0)
+        + count_on(fixed[R.MUSCLE_STIFFENING], 0.0)
+        + count_on(fixed[R.MUSCLE_LOAD_CURVE], 0.0)
+        + count_on(fixed[R.MUSCLE_LOAD_STIFFENING], 0.0)
+        + count_on(fixed[R.MUSCLE_LOAD_STIFFENING_2], 0.0)
+        + count_on(fixed[R.MUSCLE_LOAD_STIFFENING_ROOT], 0.0)
+        + count_on(fixed[R.MUSCLE_VISCOSITY], 0.0)
+        + count_on(fixed[R.MASS_LOAD_ERROR], 0.0)
+        + count_on(fixed[R.MASS_SLACK], 0.0)
+    )
+
+
+@kernel
+def plain_pull(
+    rows: Any, fixed: Any, j: int, was: float, x: float, own: Any
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return :func:`finer_pull` where no finer term is on: the same bits by fewer operations.
+
+    Rows 8 and 9 of ``own`` are 1 / rest length [1/m] and braid force / strain [N].
+    """
+    e = x * own[8][j]
+    slack, load = decay(e / fixed[R.MUSCLE_BRAID_STRAIN][j]), rows[R.LOAD][j]
+    area, taper = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j]
+    force, k1, k3 = (
+        fixed[R.MUSCLE_BRAID_FORCE][j],
+        fixed[R.MUSCLE_STIFFNESS][j],
+        fixed[R.MUSCLE_HARDENING][j],
+    )
+    middle = 0.5 * (was + rows[R.DRIVE][j])
+    pull = tension(was, e, slack, area, taper, force, k1, k3)
+    slope = tension_slope(middle, e, slack, area, taper, own[9][j], k1, k3)
+    damping, grown = fixed[R.MASS_DAMPING][j], area * (1.0 - taper * e)
+    return pull, slope, load, load * GRAVITY, 0.0, damping, grown
+
+
+@kernel
+def finer_pull(
+    rows: Any, fixed: Any, j: int, was: float, x: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return force [N] and slope [N] of the law at a predicted contraction [m], with all terms.
+
+    Then the mass of the load [kg], its weight that hangs [N] and that weight's slope [N], the
+    damping [N s/m], and the growth of the force with the effective pressure [m2]. The pressure goes
+    from ``was`` to the present one.
+    """
+    length = fixed[R.MUSCLE_REST_LENGTH][j]
+    mass, weight, stiffer, shift = carried(fixed, j, rows[R.LOAD][j])
+    e = x * (1.0 / length)
+    middle = 0.5 * (was + rows[R.DRIVE][j]) - shift
+    pull, slope = law_of(fixed, j, was - shift, middle, e, stiffer)
+    slack = fixed[R.MASS_SLACK][j]
+    hangs = load_fraction(x, rows[EFFECTS_AT + S.hangs][j], slack)
+    eased = weight * length / max(slack, 1e-6)
+    loss = fixed[R.MASS_DAMPING][j] + viscous_damping(
+        fixed[R.MUSCLE_VISCOSITY][j], rows[R.VELOCITY][j], fixed[R.MUSCLE_VISCOSITY_SPEED][j]
+    )
+    taper = fixed[R.MUSCLE_AREA_TAPER][j] + fixed[R.MUSCLE_AREA_CURVE][j] * e
+    area = fixed[R.MUSCLE_AREA][j] * (1.0 - taper * e)
+    return pull, slope, mass, weight * hangs, eased if 0.0 < hangs < 1.0 else 0.0, loss, area
+
+
+@kernel
+def mapped_pull(
+    rows: Any, fixed: Any, j: int, was: float, x: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return :func:`finer_pull` with the map of the static law."""
+    pull, slope, mass, hung, eased, loss, area = finer_pull(rows, fixed, j, was, x)
+    _, _, _, shift = carried(fixed, j, rows[R.LOAD][j])
+    e = x / fixed[R.MUSCLE_REST_LENGTH][j]
+    middle = 0.5 * (was + rows[R.DRIVE][j]) - shift
+    more, _, _ = map_force(fixed, j, R.MUSCLE_MAP_05, was - shift, e)
+    _, steeper, wider = map_force(fixed, j, R.MUSCLE_MAP_05, middle, e)
+    return pull + more, slope + steeper, mass, hung, eased, loss, area + wider
+
+
+@kernel
+def forces(
+    rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, finer: int, maps: int
+) -> None:
     """Write the linearised motion of a tile, the effective pressure going from ``was``.
 
     Rows 3 to 7 of ``own``, per unit mass: stiffness, push at the predicted middle, jerk, damping,
-    and one over the mass [1/kg].
+    and one over the mass [1/kg]. Rows 8 and 9 are constant (:func:`plain_pull`).
     """
-    x, v, drive, load = rows[R.CONTRACTION], rows[R.VELOCITY], rows[R.DRIVE], rows[R.LOAD]
+    x, v = rows[R.CONTRACTION], rows[R.VELOCITY]
     friction, sticking, strain = own[0], own[1], own[3]
-    springs, pushes, jerks, drags, lightness = own[3], own[4], own[5], own[6], own[7]
     for j in range(LANES):
         friction[j] = 0.0
         sticking[j] = 0.0
@@ -328,51 +425,53 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, ma
             rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_1, R.MUSCLE_STRAND_BREAK, strain,
             drive, friction, sticking,
         )  # fmt: skip
-    for j in range(LANES):
-        per_length = 1.0 / fixed[R.MUSCLE_REST_LENGTH][j]
-        mass, weight, stiffer, shift = carried(fixed, j, load[j])
-        ahead = 0.5 * h * v[j]
-        e = (x[j] + ahead) * per_length
-        middle = 0.5 * (was[j] + drive[j]) - shift
-        pull, slope = law_of(fixed, j, was[j] - shift, middle, e, stiffer)
-        taper = fixed[R.MUSCLE_AREA_TAPER][j] + fixed[R.MUSCLE_AREA_CURVE][j] * e
-        gain = fixed[R.MUSCLE_AREA][j] * (1.0 - taper * e)
-        if maps > 0:
-            more, _, _ = map_force(fixed, j, R.MUSCLE_MAP_05, was[j] - shift, e)
-            _, steeper, wider = map_force(fixed, j, R.MUSCLE_MAP_05, middle, e)
-            pull, slope, gain = pull + more, slope + steeper, gain + wider
-        rub = fixed[R.HYSTERESIS_FRICTION][j]
-        pull, slope = pull - friction[j], slope + sticking[j]
-        pull, slope = pull - rub * rows[R.LAG][j], slope + rub * rows[R.STICK][j]
-        slack = fixed[R.MASS_SLACK][j]
-        hangs = load_fraction(x[j] + ahead, rows[EFFECTS_AT + S.hangs][j], slack)
-        eased = weight * fixed[R.MUSCLE_REST_LENGTH][j] / max(slack, 1e-6)
-        slope = slope + (eased if 0.0 < hangs < 1.0 else 0.0)
-        loss = fixed[R.MASS_DAMPING][j] + viscous_damping(
-            fixed[R.MUSCLE_VISCOSITY][j], v[j], fixed[R.MUSCLE_VISCOSITY_SPEED][j]
-        )
-        stiff = slope * per_length + air_stiffness(rows, j, EFFECTS_AT + S.air)
-        moved = max(0.0, mass) * fixed[R.MASS_CARRIED][j] + fixed[R.MASS_MOVING_MASS][j]
-        # motion that is over within the sub-step is followed as slowly as the series reaches
-        per_mass = 1.0 / max(moved, loss * h * FASTEST_DECAY, stiff * h * h * FASTEST_TURN)
-        springs[j] = stiff * per_mass
-        pushes[j] = (pull - weight * hangs) * per_mass
-        jerks[j] = gain * (drive[j] - was[j]) * per_mass / h
-        drags[j] = per_mass * loss
-        lightness[j] = per_mass
+    if maps > 0:
+        for j in range(LANES):
+            found = mapped_pull(rows, fixed, j, was[j], x[j] + 0.5 * h * v[j])
+            write_motion(rows, fixed, j, was[j], h, own, *found)
+    elif finer > 0:
+        for j in range(LANES):
+            found = finer_pull(rows, fixed, j, was[j], x[j] + 0.5 * h * v[j])
+            write_motion(rows, fixed, j, was[j], h, own, *found)
+    else:
+        for j in range(LANES):
+            found = plain_pull(rows, fixed, j, was[j], x[j] + 0.5 * h * v[j], own)
+            write_motion(rows, fixed, j, was[j], h, own, *found)
+
+
+@kernel
+def write_motion(
+    rows: Any, fixed: Any, j: int, was: float, h: float, own: Any, pull: float, slope: float,
+    mass: float, hung: float, eased: float, loss: float, area: float,
+) -> None:  # fmt: skip
+    """Write the linearised motion of lane ``j`` (:func:`forces`); see :func:`finer_pull`."""
+    rub = fixed[R.HYSTERESIS_FRICTION][j]
+    pull, slope = pull - own[0][j], slope + own[1][j]
+    pull, slope = pull - rub * rows[R.LAG][j], slope + rub * rows[R.STICK][j]
+    slope = slope + eased
+    stiff = slope * own[8][j] + air_stiffness(rows, j, EFFECTS_AT + S.air)
+    moved = max(0.0, mass) * fixed[R.MASS_CARRIED][j] + fixed[R.MASS_MOVING_MASS][j]
+    # motion that is over within the sub-step is followed as slowly as the series reaches
+    per_mass = 1.0 / max(moved, loss * h * FASTEST_DECAY, stiff * h * h * FASTEST_TURN)
+    own[3][j] = stiff * per_mass
+    own[4][j] = (pull - hung) * per_mass
+    own[5][j] = area * (rows[R.DRIVE][j] - was) * per_mass / h
+    own[6][j] = per_mass * loss
+    own[7][j] = per_mass
 
 
 @kernel
 def move(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, was: Any,
-    h: float, own: Any, strands: int, maps: int, sticks: int, mounts: int, stretches: int,
+    h: float, own: Any, strands: int, sticks: int, mounts: int, stretches: int, finer: int,
+    maps: int,
 ) -> None:  # fmt: skip
     """Move the load of a tile for ``h`` seconds, the effective pressure going from ``was``."""
     x, v, stuck = rows[R.CONTRACTION], rows[R.VELOCITY], rows[EFFECTS_AT + S.stuck]
     before, width = own[0], own[1]
     springs, pushes, jerks, drags, lightness = own[3], own[4], own[5], own[6], own[7]
     hysteresis_ahead(rows, fixed, counts, table, hysteresis, 0, LANES, elements, 0.5 * h)
-    forces(rows, fixed, was, h, own, strands, maps)
+    forces(rows, fixed, was, h, own, strands, finer, maps)
     if sticks > 0:
         for j in range(LANES):
             dx, v[j], stuck[j] = stick_slip_step(
@@ -400,10 +499,9 @@ def move(
         shown[j] = x[j]
         width[j] = h
     if stretches > 0:
-        creep_step(
-            rows, fixed, EFFECTS_AT + S.stretch, R.MUSCLE_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0,
-            LANES, x, width, shown,
-        )  # fmt: skip
+        left = scratch(4, LANES)
+        creep_left(fixed, R.MUSCLE_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left)
+        creep_step(rows, fixed, EFFECTS_AT + S.stretch, R.MUSCLE_CREEP_1, 0, LANES, x, left, shown)
     for j in range(LANES):
         rows[EFFECTS_AT + S.position][j] = shown[j] - rows[R.REST][j]
     if mounts > 0:
@@ -416,6 +514,36 @@ def move(
 
 
 @kernel
+def lead_pressures(
+    rows: Any, fixed: Any, i: int, h: float, valve: int, older: Any, newer: Any, width: Any,
+    own: Any, work: Any,
+) -> None:  # fmt: skip
+    """Write the pressures of a tile at the end of sub-step ``i``, each interval in one pass.
+
+    The regulators are one interval ahead of the lanes whose setpoint has not yet switched.
+    """
+    pressure, travel = rows[R.PRESSURE], rows[EFFECTS_AT + S.travel]
+    at, late, target, ahead, before = work[10], work[11], work[12], work[13], work[14]
+    for n in range(0 if i == 0 else i + 1, i + 2):
+        interval_of(n, at, late, older, newer, h, target, width)
+        given = ahead if n > 0 else pressure
+        for j in range(LANES):
+            before[j] = given[j]
+        for j in range(LANES):
+            ahead[j] = before[j]
+        air_step(
+            rows, fixed, EFFECTS_AT + S.air, R.EFFECT.regulator, ahead,
+            fixed[R.REGULATOR_MAX_PRESSURE], fixed[R.REGULATOR_TIME_CONSTANT],
+            fixed[R.REGULATOR_SLEW_RATE], target, width, own, valve, 0,
+        )  # fmt: skip
+        for j in range(LANES):
+            travel[j] += abs(ahead[j] - own[1][j])
+    for j in range(LANES):
+        last, earlier = ahead[j], before[j]
+        pressure[j] = last if at[j] <= i else earlier
+
+
+@kernel
 def advance_extended(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, substeps: int,
     period: float, work: Any,
@@ -425,7 +553,7 @@ def advance_extended(
     drive, load = rows[R.DRIVE], rows[R.LOAD]
     older, newer, switch, was, width = work[3], work[4], work[5], work[6], work[7]
     late = work[8]
-    own = scratch(8, LANES)
+    own, left = scratch(10, LANES), scratch(4, LANES)
     air, effects, shift, end = EFFECTS_AT + S.air, R.EFFECT.regulator, work[9], own[2]
     flows, creeps = flows_on(fixed, effects), creeps_on(fixed, R.HYSTERESIS_CREEP_1)
     stretches = creeps_on(fixed, R.MUSCLE_CREEP_1)
@@ -442,7 +570,7 @@ def advance_extended(
     strands, sticks = strands_on(fixed, R.MUSCLE_STRAND_1), count_on(fixed[R.MASS_STICK], 0.0)
     maps = map_on(fixed, R.MUSCLE_MAP_05)
     fine = sticks + count_on(fixed[R.MUSCLE_VISCOSITY], 0.0)
-    parts = FINE_PARTS if fine > 0 else 1
+    parts, finer = FINE_PARTS if fine > 0 else 1, finer_terms_on(fixed)
     for j in range(LANES):
         if load[j] != rows[EFFECTS_AT + S.hung][j]:
             rows[EFFECTS_AT + S.hung][j] = load[j]
@@ -451,7 +579,19 @@ def advance_extended(
         rows, R.HISTORY, rows[R.SET_POINT], fixed[R.REGULATOR_DEAD_TIME], counts[R.STEP], period,
         older, newer, switch,
     )  # fmt: skip
+    begin_leak(rows, air)
+    for j in range(LANES):
+        width[j] = h
+        own[8][j] = 1.0 / fixed[R.MUSCLE_REST_LENGTH][j]
+        own[9][j] = fixed[R.MUSCLE_BRAID_FORCE][j] / fixed[R.MUSCLE_BRAID_STRAIN][j]
+    creep_left(fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left)
+    # pressures that follow from the setpoints alone are one interval ahead of the motion
+    leads = 1 if STAGED + flows + lines + worn == 0 else 0
+    if leads > 0:
+        switch_substeps(switch, substeps, period, work[10], work[11])
     for i in range(substeps):
+        if leads > 0:
+            lead_pressures(rows, fixed, i, h, valve, older, newer, width, own, work)
         late_shares(switch, i, substeps, period, late)
         if flows > 0:
             squeeze_muscle(rows, fixed, AHEAD, shift)
@@ -464,7 +604,7 @@ def advance_extended(
             )  # fmt: skip
             for j in range(LANES):
                 rows[EFFECTS_AT + S.travel][j] += abs(rows[R.PRESSURE][j] - own[1][j])
-        for stage in range(0 if flows == LANES else 2):  # older setpoint, then the newer one
+        for stage in range(0 if flows == LANES or leads > 0 else 2):  # older, then newer setpoint
             if stage_widths(late, stage, h, width) == 0:
                 continue
             if flows > 0:
@@ -478,15 +618,22 @@ def advance_extended(
             for j in range(LANES):
                 rows[EFFECTS_AT + S.travel][j] += abs(rows[R.PRESSURE][j] - own[1][j])
             if STAGED > 0:
+                creep_left(
+                    fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left
+                )
                 effective_pressure(
-                    rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, width, own,
+                    rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, left, own,
                     creeps, worn,
                 )  # fmt: skip
-        if STAGED == 0 or flows > 0:
+        if STAGED > 0 and flows > 0:
             for j in range(LANES):
-                width[j] = h if STAGED == 0 or fixed[effects + AIR.flow][j] > 0.0 else 0.0
+                width[j] = h if fixed[effects + AIR.flow][j] > 0.0 else 0.0
+            creep_left(
+                fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left
+            )
+        if STAGED == 0 or flows > 0:
             effective_pressure(
-                rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, width, own,
+                rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, left, own,
                 creeps, worn,
             )  # fmt: skip
         for j in range(LANES):
@@ -497,11 +644,15 @@ def advance_extended(
                 for j in range(LANES):
                     was[j] = drive[j]
                     end[j] = end[j] + shift[j]
-            for j in range(LANES):
-                drive[j] = was[j] + (end[j] - was[j]) / (parts - q)
+            if parts - q > 1:
+                for j in range(LANES):
+                    drive[j] = was[j] + (end[j] - was[j]) / (parts - q)
+            else:
+                for j in range(LANES):
+                    drive[j] = was[j] + (end[j] - was[j])
             move(
                 rows, fixed, counts, table, hysteresis, elements, was, h / parts, own, strands,
-                maps, sticks, mounts, stretches,
+                sticks, mounts, stretches, finer, maps,
             )  # fmt: skip
             if flows > 0:
                 for j in range(LANES):
@@ -531,4 +682,5 @@ def replacements(kind: str, first: int) -> dict[str, Any]:
         "true_position": true_position,
         "seen_position": seen_position,
         "seen_pressure": seen_pressure,
+        "lost_pressure": lost_pressure,
     }

@@ -134,6 +134,12 @@ def seen_pressure(rows: Any, j: int) -> float:
 
 
 @kernel
+def lost_pressure(rows: Any, j: int) -> float:
+    """Return the pressure [Pa] that leaked in this control period: a plain plant has no leak."""
+    return 0.0
+
+
+@kernel
 def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     """Begin the effects: a plain plant has none."""
 
