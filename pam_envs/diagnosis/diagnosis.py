@@ -176,8 +176,8 @@ def fit_failures_explained() -> Iterator[None]:
 
 
 EXCHANGE = (0.06, 0.6)
-"""Seconds before and after a change of the load that are not compared: a recording does not tell how
-the load was exchanged."""
+"""Seconds before and after a change of the load that are not compared: a recording does not show
+how the load was exchanged."""
 
 
 def exchanges(recording: Recording) -> Flags:

@@ -26,6 +26,8 @@ LEAST_BLOCKS = 8  # number of held-out blocks that a confidence interval needs
 ROUNDS = 3  # rounds of a rival's fit to the training data
 DRAWS = 400
 LEVEL = (0.025, 0.975)
+FADED = 0.02
+"""Size below which a shape has faded."""
 
 
 @dataclass(frozen=True)
@@ -133,11 +135,16 @@ def hold_out(
 ) -> HeldOut:
     """Fit all candidates to the training data.
 
-    ``plain`` is the base without the differences that the recording needs. Both start from their
-    fits to the decision's samples, all others from the new base with their own parameters; model and close rivals also start from their previous fits, and the better fit
+    ``plain`` is the base without the differences that the recording needs. Both start from
+    their fits to the decision's samples, all others from the new base with their own
+    parameters; model and close rivals also start from their previous fits, and the better fit
     to the training data counts. A rival with a cause that happens once cannot be judged on
     held-out kinds of experiment and is left to the interleaved blocks.
     """
+    # shapes that fade, like settling at the start, are seen in their first seconds alone
+    fading = (problem.shapes.min(axis=1) < FADED) if len(problem.shapes) else np.zeros(0, bool)
+    early = (problem.shapes[fading] > FADED).any(axis=0) if fading.any() else False
+    choice = replace(choice, rows=choice.rows & ~np.broadcast_to(early, choice.rows.shape))
     rows, again = choice.rows, replace(problem, train=~choice.rows)
     part = _held_blocks(problem, blocks, rows)
     first = refit(again, blocks, plain)

@@ -49,12 +49,12 @@ def calibrate(
 ) -> Calibration:
     """Fit the base of a plant.
 
-    The regulator is fitted first, to the pressure alone, in several orders; then the static map and
-    the friction by a regression of the force balance; then all parameters by simulation. If that
-    fit is far from the readings, a second one starts from the given plant, and the better of the
-    two is kept. ``measured`` (channels, T) is NaN where there is no reading, ``noise`` is its RMS
-    (channels,), ``shapes`` those of :class:`Problem`; ``rates`` are the forms of a limited rate that
-    the regulator may have.
+    The regulator is fitted first, to the pressure alone, in several orders; then the static map
+    and the friction by a regression of the force balance; then all parameters by simulation. If
+    that fit is far from the readings, a second one starts from the given plant, and the better
+    of the two is kept. ``measured`` (channels, T) is NaN where there is no reading, ``noise``
+    is its RMS (channels,), ``shapes`` those of :class:`Problem`; ``rates`` are the forms of a
+    limited rate that the regulator may have.
     """
     extra = np.zeros((0, 0)) if shapes is None else shapes
     longest = float(np.nanmax(measured[0], initial=0.0))

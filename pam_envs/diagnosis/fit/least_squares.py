@@ -21,7 +21,7 @@ FEW_DAMPINGS = (1e-6, 1e-3, 0.3)
 LEAST_DAMPING = 1e-9  # regularisation of the normal equations
 STALLED = 1e3  # factor on all dampings after a round without improvement
 REACH_LOG, REACH = 1.0, 30.0  # longest steps in internal coordinates
-SHAPE_PRIOR = 300.0
+SHAPE_PRIOR = 50.0
 """Standard deviation of the size of a shape, over the noise."""
 WORST = 1e4  # largest weighted residual, also of a diverged simulation
 

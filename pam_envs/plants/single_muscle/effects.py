@@ -423,7 +423,7 @@ def forces(
             strain[j] = (x[j] + 0.5 * h * v[j]) / fixed[R.MUSCLE_REST_LENGTH][j]
         strand_forces(
             rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_1, R.MUSCLE_STRAND_BREAK, strain,
-            drive, friction, sticking,
+            rows[R.DRIVE], friction, sticking,
         )  # fmt: skip
     if maps > 0:
         for j in range(LANES):

@@ -1,7 +1,7 @@
 """Static law: the force at rest depends on pressure and length in another form.
 
-Every laboratory's muscle has its own map of force over pressure and length: other geometry, fittings
-and bladder. The base fits the coefficients of one form. This cause adds the products of polynomials
+Every muscle has its own map of force over pressure and length, from its geometry, fittings and
+bladder. The base fits the coefficients of one form. This cause adds the products of polynomials
 that the form lacks, as a smooth correction of the force.
 """
 

@@ -1,8 +1,8 @@
 """Slew limit: the flow of the valve limits the rate of the pressure.
 
 A fully open valve passes a limited flow, so that large steps follow a straight ramp before they
-round off. Small steps do not reach the limit and follow the lag alone. The flow through the orifices of
-supply and exhaust limits the rate to one that depends on the pressure.
+round off. Small steps do not reach the limit and follow the lag alone. The flow through the
+orifices of supply and exhaust limits the rate to one that depends on the pressure.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
