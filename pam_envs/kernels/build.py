@@ -85,6 +85,10 @@ def array_at(book: Any, index: int, dimensions: int, kind: int) -> Any:
     raise NotImplementedError("only compiled kernels read arrays by their address")
 
 
+INTRINSICS = dict.fromkeys(("prange", "tile_view", "scratch", "array_at"), "of the compiler")
+"""Names that the compiler replaces, for digests of a call graph."""
+
+
 def address_book(arrays: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
     """Return addresses and shapes of arrays that stay alive, four words each.
 

@@ -2,18 +2,19 @@
 
 import contextlib
 import hashlib
-import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
 from numba import get_num_threads, njit, prange, types
-from numba.core import caching, cgutils
+from numba.core import caching, cgutils, event
 from numba.core.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
 from pam_envs.kernels import rebind
+from pam_envs.kernels.cache import FOLDER
+from pam_envs.kernels.notice import Notice
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
 _CALLEE: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -158,17 +159,40 @@ def _array_at(typing: Any, book: Any, index: Any, dimensions: Any, kind: Any) ->
 _REPLACED: dict[str, Any] = {"tile_view": _tile_view, "scratch": _scratch, "array_at": _array_at}
 __all__ = ["compiled", "get_num_threads"]
 _DONE: dict[Any, Any] = {}
-_BASE = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-FOLDER = Path(os.environ.get("PAM_ENVS_CACHE") or Path(_BASE) / "pam_envs")
-"""Folder of compiled code."""
 _COMPILER = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:16]
 """Digest of this file: its options and intrinsics are part of the code."""
 
 
+class _Listener(event.Listener):
+    """Shows a message while a kernel is compiled, not while it is read from the disk."""
+
+    def __init__(self) -> None:
+        self._notice = Notice()
+
+    def on_start(self, event: Any) -> None:
+        """Begin the message with the name of the outermost kernel."""
+        name = event.data["dispatcher"].py_func.__name__
+        self._notice.begin(name.rpartition("_")[0])
+
+    def on_end(self, event: Any) -> None:
+        """End the message."""
+        self._notice.end()
+
+
+event.register("numba:compile", _Listener())
+
+
 def compiled(
-    function: Callable[..., Any], name: str, parallel: bool, names: dict[str, Any]
+    function: Callable[..., Any],
+    name: str,
+    parallel: bool,
+    names: dict[str, Any],
+    for_python: bool = True,
 ) -> Callable[..., Any]:
-    """Return a dispatcher for a kernel with replaced names (see ``build.build``)."""
+    """Return a dispatcher for a kernel with replaced names (see ``build.build``).
+
+    Without ``for_python`` it has no wrapper for Python and is not cached: its LLVM IR is wanted.
+    """
     names = {"prange": prange if parallel else range, **_REPLACED, **names}
     digests: dict[Any, str] = {}
     entry_name = f"{name}_parallel" if parallel else name
@@ -182,6 +206,8 @@ def compiled(
         made.__module__ = rebind.__name__  # code from the disk imports it: no kernel's own place
         if not entry:
             return njit(forceinline=original.__pam_kernel__, **_CALLEE)(made)  # type: ignore[no-any-return]
+        if not for_python:
+            return njit(**_CALLEE)(made)  # type: ignore[no-any-return]
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
         with contextlib.suppress(RuntimeError):  # without a place to write nothing is kept
             dispatcher._cache = _Cache(made)

@@ -269,6 +269,10 @@ def step_tiles(
                     )
 
 
+N_ARRAYS = 12
+"""Arrays in the address book of an environment."""
+
+
 @kernel
 def step_by_address(book: Any, mode: int) -> None:
     """Step or reset one environment, given the address book of its arrays."""
