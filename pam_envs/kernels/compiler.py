@@ -113,6 +113,20 @@ def _tile_view(typing: Any, tiles: Any, tile: Any, rows: Any, lanes: Any) -> Any
     return view(tiles, types.intp, rows, lanes), generate
 
 
+@intrinsic
+def _lane_view(typing: Any, rows: Any, lane: Any) -> Any:
+    """Return a view of rows that begins at the element of a lane (see ``build.lane_view``)."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        source = make_array(signature.args[0])(context, builder, arguments[0])
+        shape = cgutils.unpack_tuple(builder, source.shape)
+        shared = builder.icmp_signed("==", shape[1], context.get_constant(types.intp, 1))
+        first = builder.select(shared, context.get_constant(types.intp, 0), arguments[1])
+        return _view(context, builder, rows, builder.gep(source.data, [first]), shape)
+
+    return rows(rows, types.intp), generate
+
+
 @intrinsic(prefer_literal=True)
 def _scratch(typing: Any, rows: Any, lanes: Any) -> Any:
     """Return rows of scratch on the stack, of constant shape."""
@@ -156,7 +170,12 @@ def _array_at(typing: Any, book: Any, index: Any, dimensions: Any, kind: Any) ->
     return view(book, types.intp, dimensions, kind), generate
 
 
-_REPLACED: dict[str, Any] = {"tile_view": _tile_view, "scratch": _scratch, "array_at": _array_at}
+_REPLACED: dict[str, Any] = {
+    "tile_view": _tile_view,
+    "lane_view": _lane_view,
+    "scratch": _scratch,
+    "array_at": _array_at,
+}
 __all__ = ["compiled", "get_num_threads"]
 _DONE: dict[Any, Any] = {}
 _COMPILER = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:16]

@@ -8,7 +8,7 @@ the IR does not allow it: all of them compute the same bits.
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -87,22 +87,22 @@ def freestanding(text: str, kernel: str, words: int, entry: str) -> str:
     return f"; entry: {entry}\n" + text
 
 
-def emit(text: str, target: Target, assembly: bool = False) -> bytes:
-    """Return the object file, or the assembly, of IR for a target.
+def emit(texts: str | Iterable[str], target: Target, assembly: bool = False) -> bytes:
+    """Return the object file, or the assembly, of one or several modules of IR for a target.
 
     Raises
     ------
     RuntimeError
         If the code would call a function of Python, of numba or of libm.
     """
-    module, machine = optimised(text, target)
+    module, machine = optimised([texts] if isinstance(texts, str) else list(texts), target)
     if assembly:
         return machine.emit_assembly(module).encode()  # type: ignore[no-any-return]
     return machine.emit_object(module)  # type: ignore[no-any-return]
 
 
-def optimised(text: str, target: Target) -> tuple[Any, Any]:
-    """Return a module after the O3 pipeline, and the target machine."""
+def optimised(texts: Sequence[str], target: Target) -> tuple[Any, Any]:
+    """Return the linked module after the O3 pipeline, and the target machine."""
     _initialise()
     options = {"reloc": "pic", "codemodel": "default"}
     if target.jit:  # as numba's own code of this process
@@ -111,7 +111,9 @@ def optimised(text: str, target: Target) -> tuple[Any, Any]:
     machine = llvm.Target.from_triple(target.triple).create_target_machine(
         cpu=target.cpu, features=target.features, opt=3, jit=target.jit, **options
     )
-    module = llvm.parse_assembly(text)
+    module, *others = map(llvm.parse_assembly, texts)
+    for other in others:
+        module.link_in(other)
     module.triple, module.data_layout = target.triple, str(machine.target_data)
     tuning = llvm.create_pipeline_tuning_options(speed_level=3)
     tuning.loop_vectorization = tuning.slp_vectorization = True
