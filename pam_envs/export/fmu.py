@@ -1,4 +1,4 @@
-"""FMU: co-simulation for FMI 3.0 and FMI 2.0, with binaries for every platform that can be linked."""
+"""FMU: co-simulation for FMI 3.0 and FMI 2.0, with binaries for one or several platforms."""
 
 import html
 import tempfile
@@ -104,9 +104,9 @@ def _link(model: Model, place: Path, platform: str) -> tuple[bytes, bytes]:
 def fmi_header(model: Model) -> str:
     """Return the header that names the model for ``fmi/component.h``."""
     p = model.prefix
-    starts = ", ".join(_literal(v.start) for v in model.inputs)
-    lows = ", ".join(_literal(v.low or 0.0) for v in model.parameters) or "0"
-    highs = ", ".join(_literal(v.high or 0.0) for v in model.parameters) or "0"
+    starts = ", ".join(literal(v.start) for v in model.inputs)
+    lows = ", ".join(literal(v.low or 0.0) for v in model.parameters) or "0"
+    highs = ", ".join(literal(v.high or 0.0) for v in model.parameters) or "0"
     aliases = "\n".join(
         f"#define MODEL_{word} {p}_{word}"
         for word in ("init", "reset", "step", "output", "parameter")
@@ -117,7 +117,7 @@ def fmi_header(model: Model) -> str:
 #define MODEL_NAME "{model.name}"
 {aliases}
 #define TOKEN "{token(model)}"
-#define PERIOD {_literal(model.period)}
+#define PERIOD {literal(model.period)}
 #define EPISODIC {int(model.episodic)}
 #define INPUTS {len(model.inputs)}u
 #define OUTPUTS {len(model.outputs)}u
@@ -126,10 +126,6 @@ def fmi_header(model: Model) -> str:
 #define PARAMETER_LOW {{{lows}}}
 #define PARAMETER_HIGH {{{highs}}}
 """
-
-
-def _literal(value: float) -> str:
-    return literal(value)
 
 
 def token(model: Model) -> str:
@@ -219,14 +215,14 @@ def description2(model: Model) -> str:
     variables = ElementTree.SubElement(root, "ModelVariables")
 
     def scalar(name: str, reference: int, causality: str, variability: str) -> ElementTree.Element:
-        attributes = {"causality": causality, "variability": variability}
-        if causality == "output":
-            attributes["initial"] = "calculated"
-        elif causality == "parameter":
-            attributes["initial"] = "exact"
-        return ElementTree.SubElement(
-            variables, "ScalarVariable", name=name, valueReference=str(reference), **attributes
-        )
+        made = ElementTree.SubElement(
+            variables, "ScalarVariable", name=name, valueReference=str(reference),
+            causality=causality, variability=variability,
+        )  # fmt: skip
+        initial = {"output": "calculated", "parameter": "exact"}
+        if causality in initial:
+            made.set("initial", initial[causality])
+        return made
 
     for k, v in enumerate(model.inputs):
         _real(scalar(f"input.{dotted(v)}", 1 + k, "input", "continuous"), v, True)
@@ -254,32 +250,34 @@ def _flag(variable: Variable) -> bool:
     return variable.block == "flags"
 
 
-def _spans(v: Variable, start: bool) -> dict[str, str]:
-    found = {"unit": v.unit}
+def _set_spans(made: ElementTree.Element, v: Variable, start: bool) -> None:
+    """Set unit, bounds and start value of a number."""
+    made.set("unit", v.unit)
     if v.low is not None and v.high is not None:
-        found |= {"min": repr(float(v.low)), "max": repr(float(v.high))}
+        made.set("min", repr(float(v.low)))
+        made.set("max", repr(float(v.high)))
     if start:
-        found["start"] = repr(float(v.start))
-    return found
+        made.set("start", repr(float(v.start)))
 
 
 def _float(
     parent: ElementTree.Element, name: str, reference: int, v: Variable, causality: str, how: str
 ) -> None:
-    extra = {"initial": "calculated"} if causality == "output" else {}
-    spans = _spans(v, causality != "output")
-    if v.text:
-        extra["description"] = v.text
-    ElementTree.SubElement(
+    made = ElementTree.SubElement(
         parent, "Float64", name=name, valueReference=str(reference), causality=causality,
-        variability=how, **extra, **spans,
+        variability=how,
     )  # fmt: skip
+    if causality == "output":
+        made.set("initial", "calculated")
+    if v.text:
+        made.set("description", v.text)
+    _set_spans(made, v, causality != "output")
 
 
 def _real(parent: ElementTree.Element, v: Variable, start: bool) -> None:
     if v.text:
         parent.set("description", v.text)
-    ElementTree.SubElement(parent, "Real", **_spans(v, start))
+    _set_spans(ElementTree.SubElement(parent, "Real"), v, start)
 
 
 def _units(model: Model, root: ElementTree.Element) -> None:
@@ -288,8 +286,9 @@ def _units(model: Model, root: ElementTree.Element) -> None:
     for name in sorted(used):
         unit = ElementTree.SubElement(parent, "Unit", name=name)
         if name in _BASE:
-            powers = {base: str(power) for base, power in _BASE[name].items()}
-            ElementTree.SubElement(unit, "BaseUnit", **powers)
+            base = ElementTree.SubElement(unit, "BaseUnit")
+            for dimension, power in _BASE[name].items():
+                base.set(dimension, str(power))
 
 
 def _experiment(model: Model, root: ElementTree.Element) -> None:

@@ -4,10 +4,11 @@ import gzip
 import json
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from pam_envs.export.c import readme_body, write_sources
-from pam_envs.export.model import Model
+from pam_envs.export.model import Model, Variable
 from pam_envs.export.toolchain import WASM, run, zig
 from pam_envs.kernels.emission import emit
 
@@ -89,7 +90,9 @@ void next_episode(void) {{
     return f"""#include "{model.name}.c"
 
 static {p} model;
-static double given[{n}] = {{{starts}}}, found[{count}], changed[{max(1, len(model.parameters))}];
+static double given[{n}] = {{{starts}}};
+static double found[{count}];
+static double changed[{max(1, len(model.parameters))}];
 
 static void write(void) {{
     for (int k = 0; k < {count}; k++)
@@ -139,20 +142,9 @@ uint32_t state_size(void) {{
 def script(model: Model) -> str:
     """Return the JavaScript module."""
 
-    def listed(variables: object) -> str:
-        return json.dumps(
-            [
-                {
-                    "name": v.name,
-                    "unit": v.unit,
-                    "start": v.start,
-                    "low": v.low,
-                    "high": v.high,
-                }
-                for v in variables  # type: ignore[attr-defined]
-            ],
-            indent=1,
-        )
+    def listed(variables: Sequence[Variable]) -> str:
+        words = ("name", "unit", "start", "low", "high")
+        return json.dumps([{word: getattr(v, word) for word in words} for v in variables], indent=1)
 
     return f"""// {model.title}, exported from the kernels of pam-envs. All quantities are SI.
 // digest: {model.digest}
@@ -166,7 +158,7 @@ export class Model {{
   // source: the bytes of {model.name}.wasm, or a WebAssembly.Module
   static async create(source) {{
     const made = source instanceof WebAssembly.Module ? source : await WebAssembly.compile(source);
-    return new Model((await WebAssembly.instantiate(made, {{}})));
+    return new Model(await WebAssembly.instantiate(made, {{}}));
   }}
 
   constructor(instance) {{
@@ -227,13 +219,15 @@ export class Model {{
 
 def example(model: Model) -> str:
     """Return a program for Node that prints the bits of every output of some steps."""
-    return f"""// node example.mjs [seed [steps]] < inputs: one line of inputs a control period, or constant
-// inputs without a file. Prints the bits of every output as hexadecimal numbers.
+    return f"""// node example.mjs [seed [steps]] < inputs
+// A line of inputs is one control period; with a number of steps, inputs are constant. Prints the
+// bits of every output as hexadecimal numbers.
 import {{ readFileSync }} from "node:fs";
 import {{ Model, inputs }} from "./{model.name}.mjs";
 
 const seed = Number(process.argv[2] ?? 17), steps = Number(process.argv[3] ?? 0);
-const model = await Model.create(readFileSync(new URL("./{model.name}.wasm", import.meta.url)));
+const file = new URL("./{model.name}.wasm", import.meta.url);
+const model = await Model.create(readFileSync(file));
 const bits = (values) =>
   Array.from(new BigUint64Array(values.slice().buffer), (b) => b.toString(16)).join(" ");
 const constant = inputs.map((i) => i.start);
