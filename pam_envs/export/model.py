@@ -5,13 +5,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.kernels.machine_code import Source, intermediate_of
+from pam_envs.wording import package
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Model:
             **self.facts,
             "control period": f"{self.period:g} s",
             "digest": self.digest,
-            "made by": f"pam-envs {version('pam-envs')}",
+            "made by": package(),
         }
         return [f"{name}: {text}" for name, text in facts.items()]
 

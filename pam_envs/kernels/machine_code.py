@@ -22,7 +22,7 @@ from typing import Any, Protocol
 from pam_envs.kernels import shipped
 from pam_envs.kernels.build import INTRINSICS
 from pam_envs.kernels.cache import FOLDER, write_whole
-from pam_envs.kernels.notice import announce
+from pam_envs.kernels.notice import Notice, announce
 from pam_envs.kernels.rebind import graph_digest
 
 Run = Callable[[int, int], None]
@@ -112,12 +112,19 @@ class MachineCode:
         return load(data)
 
     def _compiled(self) -> bytes:
-        """Compile in this process; keep the code where that is possible."""
+        """Compile and wait; keep the code where that is possible."""
         from pam_envs.kernels import emission
 
-        kernel = self._source.by_address
-        text = emission.intermediate(kernel.function, kernel.names, kernel.words)
-        data = emission.emit(text, emission.host())
+        kernel, notice = self._source.by_address, Notice()
+        notice.begin(kernel.name)
+        try:
+            try:
+                text = intermediate_of(self._source)
+            except RuntimeError:  # the family cannot be imported, or nothing can be written
+                text = emission.intermediate(kernel.function, kernel.names, kernel.words)
+            data = emission.emit(text, emission.host())
+        finally:
+            notice.end()
         try:
             write_whole(kernel.object_file(), data)
         except OSError:
@@ -223,13 +230,16 @@ def intermediate_of(source: Source) -> str:
     kernel = source.by_address
     deadline = time.monotonic() + STALE
     while not kernel.ir_file.exists():
-        child = None if is_busy(kernel.busy_file) else start(source)
-        code = BUSY if child is None else child.wait()
-        if code not in (0, BUSY) or time.monotonic() > deadline:
+        code: int | None = BUSY
+        if not is_busy(kernel.busy_file):
+            child = start(source)
+            code = None if child is None else child.wait()
+            if code == 0 and kernel.ir_file.exists():
+                break
+        if code != BUSY or time.monotonic() > deadline:
             raise RuntimeError(
                 f"{kernel.name} could not be compiled in a process of its own (exit code {code}): "
                 f"its family has to be importable, and {FOLDER} writable (PAM_ENVS_CACHE)"
             )
-        if code == BUSY:
-            time.sleep(0.2)
+        time.sleep(0.2)
     return lzma.decompress(kernel.ir_file.read_bytes()).decode()
