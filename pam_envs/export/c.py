@@ -14,10 +14,10 @@ from pam_envs.export.toolchain import OBJECTS, emit_object, host_platform
 _TYPES = {"float64": "double", "float32": "float", "int64": "int64_t", "int8": "int8_t"}
 
 
-def export_c(model: Model, folder: Path) -> None:
-    """Write header, source, example, README and objects for several processors."""
+def export_c(model: Model, folder: Path, platforms: Iterable[str] = OBJECTS) -> None:
+    """Write header, source, example, README and objects for some processors of ``OBJECTS``."""
     write_sources(model, folder)
-    for platform in OBJECTS:
+    for platform in platforms:
         place = folder / "objects" / platform
         place.mkdir(parents=True, exist_ok=True)
         (place / f"{model.name}_kernel.o").write_bytes(emit_object(model, platform))

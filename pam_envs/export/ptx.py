@@ -13,7 +13,8 @@ import numpy as np
 
 from pam_envs.envs.core.lanes import restart_lane, step_lane
 from pam_envs.export.model import Model
-from pam_envs.kernels.emission import ENTRY, Target, emit
+from pam_envs.kernels.emission import Target, emit
+from pam_envs.kernels.intermediate import ENTRY
 from pam_envs.kernels.machine_code import AddressKernel, intermediate_of
 
 ARCHITECTURE = "sm_80"

@@ -5,7 +5,7 @@ import os
 import pickle
 import sys
 
-from pam_envs.kernels import emission
+from pam_envs.kernels import emission, intermediate
 from pam_envs.kernels.cache import FOLDER, write_whole
 from pam_envs.kernels.machine_code import BUSY, Source, is_busy
 
@@ -27,7 +27,7 @@ def main() -> int:
         if kernel.ir_file.exists():
             text = lzma.decompress(kernel.ir_file.read_bytes()).decode()
         else:
-            text = emission.intermediate(kernel.function, kernel.names, kernel.words)
+            text = intermediate.intermediate(kernel.function, kernel.names, kernel.words)
             write_whole(kernel.ir_file, lzma.compress(text.encode(), preset=6))
         write_whole(kernel.object_file(), emission.emit(text, emission.host()))
     finally:

@@ -1,41 +1,23 @@
-"""LLVM IR of a kernel, and machine code for any processor from it.
+"""Object code and assembly of LLVM IR for any processor.
 
-The IR comes from numba, for a generic processor. All that belongs to Python or to numba's runtime
-is taken out, so that the module has one public function, ``void ENTRY(int64_t *book, int64_t
-mode)``, and calls nothing but ``memset`` and ``memcpy``. llvmlite optimises it for a target and
-writes the object file or the assembly. No target fuses a multiplication with an addition, because
-the IR does not allow it: all of them compute the same bits.
+The code calls nothing but ``memset`` and ``memcpy``. No target fuses a multiplication with an
+addition, because the IR does not allow it: all of them compute the same bits.
 """
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import llvmlite.binding as llvm
 
-ENTRY = "pam_kernel"
-"""Name of the public function."""
-GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
-"""Environment variables with which numba makes IR that does not depend on this machine."""
-
-_ENTRY = """
-define internal void @NRT_incref(ptr %0) alwaysinline {{ ret void }}
-define internal void @NRT_decref(ptr %0) alwaysinline {{ ret void }}
-define void @{entry}(ptr %book, i64 %mode) {{
-  %result = alloca ptr
-  %error = alloca ptr
-  %status = call i32 @{kernel}(ptr %result, ptr %error, ptr null, ptr null, i64 {words}, i64 8,
-                               ptr %book, i64 {words}, i64 8, i64 %mode)
-  ret void
-}}
-"""
-_RUNTIME = re.compile(r"^define [^\n]*@NRT_(?:incref|decref)\(.*?^}\n", re.MULTILINE | re.DOTALL)
-_SQRT = re.compile(r"^declare double @(?:llvm\.sqrt\.f64|sqrt)\(.*\n", re.MULTILINE)
-_LINKAGE = re.compile(r"^define (?:linkonce_odr |weak_odr )?", re.MULTILINE)
-_SYMBOL = re.compile(r'@(_Z[\w.$]+|"[^"]+"|\.const[\w.$]*)')
-_ALLOWED = re.compile(r"llvm\.|mem(?:set|cpy|move)$")
+_ALLOWED = re.compile(
+    r"(?:mem(?:set|cpy|move)$|llvm\.(?:mem\w+|[su](?:min|max|add|sub|mul)\b|abs|fabs|copysign|sqrt"
+    r"|assume|expect|lifetime|ct(?:lz|tz|pop)|b(?:swap|itreverse)|fsh[lr]|masked|vector"
+    r"|experimental|dbg|trap|nvvm)\b)"
+)
+"""Functions that no target takes from libm or another library."""
 
 
 @dataclass(frozen=True)
@@ -47,44 +29,6 @@ class Target:
     features: str = ""
     jit: bool = False
     """Whether the code is loaded into this process."""
-
-
-def intermediate(
-    function: Callable[..., Any], names: Mapping[str, Any], words: int, entry: str = ENTRY
-) -> str:
-    """Return the LLVM IR of a kernel that takes an address book and a mode.
-
-    Parameters
-    ----------
-    function : callable
-        The kernel, ``function(book, mode)``.
-    names : mapping
-        Values of global names in its call graph (see ``build.build``).
-    words : int
-        Length of the address book.
-    entry : str
-        Name of the public function of the module.
-    """
-    from numba import types
-
-    from pam_envs.kernels.compiler import compiled
-
-    dispatcher: Any = compiled(function, entry, False, dict(names), for_python=False)
-    dispatcher.compile((types.Array(types.int64, 1, "C"), types.int64))
-    (made,) = dispatcher.overloads.values()
-    return freestanding(made.library.get_llvm_str(), made.fndesc.mangled_name, words, entry)
-
-
-def freestanding(text: str, kernel: str, words: int, entry: str) -> str:
-    """Return IR of numba without its runtime, with internal symbols and a plain entry function."""
-    text = _SQRT.sub("", _RUNTIME.sub("", text)).replace("@sqrt(", "@llvm.sqrt.f64(")
-    text = _LINKAGE.sub("define internal ", text).replace(" = common ", " = internal ")
-    text = text.replace("define internal internal ", "define internal ")
-    text += "\ndeclare double @llvm.sqrt.f64(double)\n"
-    text += _ENTRY.format(entry=entry, kernel=kernel, words=words)
-    short: dict[str, str] = {}  # without process-wide counters in their names
-    text = _SYMBOL.sub(lambda m: f"@k{short.setdefault(m[1], str(len(short)))}", text)
-    return f"; entry: {entry}\n" + text
 
 
 def emit(texts: str | Iterable[str], target: Target, assembly: bool = False) -> bytes:

@@ -31,7 +31,7 @@ BUSY = 3
 """Exit code of a child whose work another process is doing."""
 STALE = 600.0
 """Age [s] at which the mark of a process that compiles is taken for that of a dead one."""
-_TOOLS = [Path(__file__).with_name(name) for name in ("compiler.py", "emission.py")]
+_TOOLS = ("compiler.py", "intermediate.py")
 _LOADED: list[Any] = []  # engines, which own the code
 
 
@@ -48,9 +48,9 @@ class AddressKernel:
 
     @cached_property
     def digest(self) -> str:
-        """Digest of the call graph and of the tools that compile it."""
+        """Digest of the call graph and of the tools that make its LLVM IR."""
         graph = graph_digest(self.function, {**self.names, **INTRINSICS})
-        tools = b"".join(path.read_bytes() for path in _TOOLS)
+        tools = b"".join(Path(__file__).with_name(name).read_bytes() for name in _TOOLS)
         return hashlib.sha256(graph.encode() + tools).hexdigest()[:16]
 
     @property
@@ -65,9 +65,10 @@ class AddressKernel:
 
     def object_file(self) -> Path:
         """Return the file of the object code for this processor."""
-        from pam_envs.kernels.emission import host
+        from pam_envs.kernels import emission
 
-        key = hashlib.sha256(repr(host()).encode()).hexdigest()[:8]
+        tool = Path(emission.__file__).read_bytes()
+        key = hashlib.sha256(repr(emission.host()).encode() + tool).hexdigest()[:8]
         return FOLDER / f"{self.name}_{self.digest}_{key}.o"
 
 
@@ -113,7 +114,7 @@ class MachineCode:
 
     def _compiled(self) -> bytes:
         """Compile and wait; keep the code where that is possible."""
-        from pam_envs.kernels import emission
+        from pam_envs.kernels import emission, intermediate
 
         kernel, notice = self._source.by_address, Notice()
         notice.begin(kernel.name)
@@ -121,7 +122,7 @@ class MachineCode:
             try:
                 text = intermediate_of(self._source)
             except RuntimeError:  # the family cannot be imported, or nothing can be written
-                text = emission.intermediate(kernel.function, kernel.names, kernel.words)
+                text = intermediate.intermediate(kernel.function, kernel.names, kernel.words)
             data = emission.emit(text, emission.host())
         finally:
             notice.end()
@@ -162,7 +163,8 @@ def load(data: bytes) -> Run:
     """Return the function of an object file, which releases the lock of the interpreter."""
     import llvmlite.binding as llvm
 
-    from pam_envs.kernels.emission import ENTRY, host
+    from pam_envs.kernels.emission import host
+    from pam_envs.kernels.intermediate import ENTRY
 
     target = host()
     machine = llvm.Target.from_triple(target.triple).create_target_machine(
@@ -187,7 +189,7 @@ def is_busy(mark: Path) -> bool:
 
 def start(source: Source) -> "subprocess.Popen[bytes] | None":
     """Start a process that compiles a kernel into the cache; None if that is impossible."""
-    from pam_envs.kernels.emission import GENERIC
+    from pam_envs.kernels.intermediate import GENERIC
 
     try:
         job = pickle.dumps(source)

@@ -78,17 +78,20 @@ def write(codes: Iterable[tuple["AddressKernel", bytes]], folder: Path = FOLDER)
     (folder / MANIFEST).write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
 
 
-@lru_cache(maxsize=1)
-def _codes() -> Mapping[str, Any]:
-    """Return the entries of the manifest, none on other platforms and for other sources."""
-    if not (FOLDER / MANIFEST).exists():
-        return {}
+def supported() -> bool:
+    """Return whether this processor runs the shipped code."""
     if sys.platform != "linux" or platform.machine() not in ("x86_64", "AMD64"):
-        return {}
+        return False
     import llvmlite.binding as llvm
 
     features = llvm.get_host_cpu_features()
-    if not all(features.get(name) for name in NEEDED):
+    return all(features.get(name) for name in NEEDED)
+
+
+@lru_cache(maxsize=1)
+def _codes() -> Mapping[str, Any]:
+    """Return the entries of the manifest, none on other processors and for other sources."""
+    if not (FOLDER / MANIFEST).exists() or not supported():
         return {}
     manifest = json.loads((FOLDER / MANIFEST).read_text(encoding="utf-8"))
     return manifest["codes"] if manifest["sources"] == sources() else {}
