@@ -1,7 +1,6 @@
 """C: a header with named signals, one source file with the data, and objects of the kernels."""
 
 import math
-import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -298,11 +297,14 @@ def literal(value: Any) -> str:
     return "0" if number == 0.0 and math.copysign(1.0, number) > 0 else number.hex()
 
 
-def _wrapped(words: Iterable[str]) -> str:
-    return textwrap.fill(
-        ", ".join(words), 96, initial_indent="    ", subsequent_indent="    ",
-        break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
+def _wrapped(words: Iterable[str], width: int = 96) -> str:
+    """Return words with commas between them on lines of limited width."""
+    lines = [""]
+    for word in words:
+        if len(lines[-1]) + len(word) + 2 > width:
+            lines.append("")
+        lines[-1] += f" {word}," if lines[-1] else f"    {word},"
+    return "\n".join(lines).removesuffix(",")
 
 
 def example(model: Model) -> str:

@@ -26,7 +26,7 @@ def documented() -> dict[str, dict[str, str]]:
         for names, said in ROW.findall(page.read_text().partition("## Info")[2]):
             keys, words = re.findall(r"`([^`]+)`", names), said.strip()
             several = words.split(", ")
-            if words in PURE or any(word.startswith("state/object") for word in keys[:1]):
+            if words in PURE:
                 several = ["1"]
             if len(several) == len(keys):
                 units |= dict(zip(keys, several, strict=True))
@@ -52,7 +52,7 @@ def test_units_are_those_of_the_documentation(name: str) -> None:
     model = environment_model(name, env)
     said = documented()[PAGES[name]]
     shown = {v.name.removeprefix("info."): v.unit for v in model.group("info")}
-    common = {"time", "reference", "output", "state/object"}
+    common = {"time", "reference", "output"}
     checked = {key: unit for key, unit in shown.items() if key in said and key not in common}
     assert len(checked) > 10
     wrong = {k: (unit, said[k]) for k, unit in checked.items() if unit not in said[k].split(" or ")}

@@ -1,13 +1,16 @@
 """C: equal bits without Python, parameters, plants, objects for other processors."""
 
 from pathlib import Path
+from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 from benchmarks.exported import differing, run_c
 from pam_envs.export.c import export_c, literal
 from pam_envs.export.command import model_of, plant_of
+from pam_envs.export.environment import environment_model
 from pam_envs.export.toolchain import OBJECTS, emit_object, host_platform
 from pam_envs.plants.single_muscle.rollout import simulate
 
@@ -60,7 +63,10 @@ def test_every_variable_is_in_the_header_with_its_unit(small, tmp_path: Path) ->
 
 
 def test_digest_depends_on_the_plant(small) -> None:
-    other = model_of("PAM/MusclePositioning-v0", hysteresis="none")
+    env: Any = gym.make("PAM/MusclePositioning-v0").unwrapped
+    plant = env.plant.replace({"mass.damping": 250.0})
+    changed: Any = gym.make("PAM/MusclePositioning-v0", plant=plant).unwrapped
+    other = environment_model("PAM/MusclePositioning-v0", changed)
     assert other.digest != small.model.digest == model_of("MusclePositioning").digest
 
 

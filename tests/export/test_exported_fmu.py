@@ -1,5 +1,6 @@
 """FMUs: validity, equal bits, parameters, states, refusals."""
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,9 @@ def muscle(small, request, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Return the muscle's FMU, loaded, of each version of FMI."""
     folder = tmp_path_factory.mktemp("muscle")
     export_fmu(small.model, folder)
+    numbers = itertools.count()  # a folder for each, whose library stays mapped
     return lambda: FmuModel(
-        small.model, folder / request.param.format(small.model.name), folder / "unpacked"
+        small.model, folder / request.param.format(small.model.name), folder / str(next(numbers))
     )
 
 
@@ -94,12 +96,12 @@ def test_restored_state_repeats_the_steps(small, muscle) -> None:
 
 def test_value_out_of_bounds_is_refused(muscle) -> None:
     made = muscle()
-    with pytest.raises(Exception, match=r"set(Float64|Real)"):
+    with pytest.raises(Exception, match=r"Set(Float64|Real) failed"):
         made.start(3, mass__damping=-1.0)
 
 
 def test_step_that_is_no_multiple_of_the_period_is_refused(small, muscle) -> None:
     made = muscle()
     made.start(3)
-    with pytest.raises(Exception, match=r"DoStep|doStep"):
+    with pytest.raises(Exception, match="DoStep failed"):
         made.slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.0123)
