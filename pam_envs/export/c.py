@@ -172,7 +172,9 @@ double *{p}_parameter({p} *model, int parameter) {{
 {_parameters(model)}
 }}
 
+#ifndef PAM_WITHOUT_NAMES
 {names}
+#endif
 """
 
 

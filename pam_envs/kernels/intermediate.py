@@ -9,8 +9,12 @@ from typing import Any
 
 ENTRY = "pam_kernel"
 """Name of the public function."""
-GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
-"""Environment variables with which numba makes IR that does not depend on this machine."""
+GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_OPT": "1"}
+"""Environment variables with which numba makes IR that does not depend on this machine.
+
+It optimises little, because a target's own pipeline does so: unrolled loops are not made small
+again.
+"""
 
 _ENTRY = """
 define internal void @NRT_incref(ptr %0) alwaysinline {{ ret void }}
