@@ -4,21 +4,21 @@ import re
 from collections.abc import Mapping
 
 _WORDS = {
-    "Pa": "pressure set_point pressure_travel drive start_pressure held start lag",
+    "Pa": "pressure set_point pressure_travel drive start_pressure held start",
     "m": "contraction length cop x y z reference_x reference_y reference_z",
-    "m/s": "",
     "rad": (
         "angle knee shank ankle deviation angle_reference joint_error joint_reference intent "
         "command"
     ),
     "rad/s": "velocity rate intent_rate knee_rate deviation_rate",
     "rad/s2": "intent_acceleration knee_acceleration",
-    "N": "force tension ground_force ground_force_ahead ground_z ground_x prestress",
+    "N": "force tension ground_force ground_force_ahead ground_z ground_x heel prestress",
     "N m": (
         "torque torque_reference torque_ideal torque_clipped object_torque felt wearer demand "
         "estimate over_assistance disturbance"
     ),
-    "N m/rad": "stiffness stiffness_reference stiffness_clipped",
+    "N m/rad": "stiffness stiffness_reference stiffness_clipped hold",
+    "N m s/rad": "hold_rate",
     "kg": "air used payload load",
     "K": "temperature",
     "s": "time",

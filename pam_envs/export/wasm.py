@@ -40,7 +40,14 @@ def link(model: Model) -> bytes:
         (place / "kernel.o").write_bytes(emit(model.intermediates, WASM))
         names = [*_EXPORTS, *_STATE]
         exports = [f"-Wl,--export={name}" for name in names]
-        flags = ["-Os", "-std=c99", "-DPAM_WITHOUT_NAMES", "-Wl,--no-entry", "-Wl,--strip-all", *exports]
+        flags = [
+            "-Os",
+            "-std=c99",
+            "-DPAM_WITHOUT_NAMES",
+            "-Wl,--no-entry",
+            "-Wl,--strip-all",
+            *exports,
+        ]
         run([*_compiler(), *flags, "interface.c", "kernel.o", "-o", "model.wasm"], place)
         return (place / "model.wasm").read_bytes()
 
