@@ -314,10 +314,11 @@ def example(model: Model) -> str:
     p, n = model.prefix, len(model.inputs)
     begin = "reset(&model, 17);" if model.episodic else "reset(&model, inputs);"
     starts = _wrapped(literal(np.float64(v.start)) for v in model.inputs)
-    return f"""/* Runs {model.title}: reads inputs of one control period a line, prints the outputs.
+    return f"""/* Runs {model.title}.
  *
- * Usage: example [seed [steps]] < inputs, or without inputs for constant ones. An output line holds
- * the time and every output, as hexadecimal numbers, which show every bit.
+ * example SEED < inputs: a line of inputs is one control period; prints every output of the start
+ * and of each step, as hexadecimal numbers, which show every bit.
+ * example SEED STEPS: constant inputs; prints the outputs of the last step.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -340,15 +341,19 @@ int main(int count, char **words) {{
     {p}_init(&model);
     {p}_{begin.replace("17", "seed")}
     {"" if model.episodic else "(void)seed;"}
-    print();
-    for (long step = 0; steps == 0 || step < steps; step++) {{
-        for (int k = 0; steps == 0 && k < {n}; k++)
+    if (steps > 0) {{
+        for (long step = 0; step < steps; step++)
+            {p}_step(&model, inputs);
+        print();
+        return 0;
+    }}
+    for (;;) {{
+        print();
+        for (int k = 0; k < {n}; k++)
             if (scanf("%lf", inputs + k) != 1)
                 return 0;
         {p}_step(&model, inputs);
-        print();
     }}
-    return 0;
 }}
 """
 
@@ -366,7 +371,8 @@ run in Python. Nothing else is needed: no Python, no libm, no memory allocation.
     cc -O2 example.c {model.name}.c {link} -o example
     ./example 17 1000
 
-prints every output of the first 1,000 steps, equal to those of pam-envs to the last bit.
+prints every output after 1,000 steps with constant inputs, equal to those of pam-envs to the last
+bit.
 
 Parameters are changed between `{model.prefix}_init` and `{model.prefix}_reset`. pam-envs checks
 their bounds; the C code does not.

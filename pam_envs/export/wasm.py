@@ -226,26 +226,31 @@ export class Model {{
 
 def example(model: Model) -> str:
     """Return a program for Node that prints the bits of every output of some steps."""
-    return f"""// node example.mjs [seed [steps]] < inputs
-// A line of inputs is one control period; with a number of steps, inputs are constant. Prints the
-// bits of every output as hexadecimal numbers.
+    return f"""// node example.mjs SEED < inputs
+// A line of inputs is one control period. Prints the bits of every output of the start and of each
+// step as hexadecimal numbers.
+// node example.mjs SEED STEPS: constant inputs; prints the bits after the last step.
 import {{ readFileSync }} from "node:fs";
 import {{ Model, inputs }} from "./{model.name}.mjs";
 
 const seed = Number(process.argv[2] ?? 17), steps = Number(process.argv[3] ?? 0);
 const file = new URL("./{model.name}.wasm", import.meta.url);
 const model = await Model.create(readFileSync(file));
-const bits = (values) =>
-  Array.from(new BigUint64Array(values.slice().buffer), (b) => b.toString(16)).join(" ");
-const constant = inputs.map((i) => i.start);
-const rows = steps
-  ? Array(steps).fill(constant)
-  : readFileSync(0, "utf8").trim().split("\\n").map((line) => line.split(" ").map(Number));
-const lines = [bits(model.reset(seed))];
-const begun = performance.now();
-for (const row of rows) lines.push(bits(model.step(row)));
-console.error(`${{rows.length}} steps in ${{(performance.now() - begun).toFixed(1)}} ms`);
-console.log(lines.join("\\n"));
+const print = (values) => {{
+  const bits = new BigUint64Array(values.slice().buffer);
+  console.log(Array.from(bits, (b) => b.toString(16)).join(" "));
+}};
+model.reset(seed);
+if (steps > 0) {{
+  const constant = inputs.map((i) => i.start), begun = performance.now();
+  for (let k = 0; k < steps; k++) model.step(constant);
+  console.error(`${{Math.round((1000 * steps) / (performance.now() - begun))}} steps per second`);
+  print(model.outputs);
+}} else {{
+  print(model.outputs);
+  for (const line of readFileSync(0, "utf8").trim().split("\\n"))
+    print(model.step(line.split(" ").map(Number)));
+}}
 """
 
 
