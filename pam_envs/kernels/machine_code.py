@@ -119,13 +119,13 @@ class MachineCode:
         kernel, notice = self._source.by_address, Notice()
         notice.begin(kernel.name)
         try:
-            try:
-                text = intermediate_of(self._source)
-            except RuntimeError:  # the family cannot be imported, or nothing can be written
-                text = intermediate.intermediate(kernel.function, kernel.names, kernel.words)
-            data = emission.emit(text, emission.host())
+            text = intermediate_of(self._source)
+        except RuntimeError:  # the family cannot be imported, or nothing can be written
+            text = ""
         finally:
             notice.end()
+        text = text or intermediate.intermediate(kernel.function, kernel.names, kernel.words)
+        data = emission.emit(text, emission.host())
         try:
             write_whole(kernel.object_file(), data)
         except OSError:

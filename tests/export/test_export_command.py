@@ -132,6 +132,14 @@ def test_command_writes_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert str(folder) in capsys.readouterr().out
 
 
+def test_warmup_compiles_the_named_environments(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["warmup", "MusclePositioning", "--no-batch"]) == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.startswith("PAM/MusclePositioning-v0, single environment: ")
+    assert main(["warmup", "MusclePositionin"]) == 2
+    assert "did you mean 'MusclePositioning'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("name", "family", "unit"),
     [

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 from pam_envs.envs.core import plant_env
-from pam_envs.kernels import emission, intermediate, machine_code, shipped
+from pam_envs.kernels import emission, intermediate, machine_code, notice, shipped
 from pam_envs.kernels.build import COMPILED, address_book
 from pam_envs.kernels.machine_code import MachineCode, intermediate_of
 from tests.envs.cases import trajectory
@@ -96,6 +97,18 @@ def test_folder_that_cannot_be_written_is_no_obstacle(
     monkeypatch.setattr(machine_code, "FOLDER", tmp_path / "file" / "cache")
     assert called(MachineCode(Scale(2.0)).wait()) == [2.0, 4.0, 6.0]
     assert "PAM_ENVS_CACHE" in capsys.readouterr().err
+
+
+def test_long_compilation_is_announced(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(notice, "PATIENCE", 0.0)
+    over = threading.Event()
+    notice._show("batch_positioning", over)
+    assert "compiling batch_positioning" in capsys.readouterr().err
+    over.set()
+    notice._show("batch_positioning", over)
+    assert capsys.readouterr().err == ""
 
 
 def test_call_of_libm_is_refused() -> None:
