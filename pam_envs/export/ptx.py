@@ -128,7 +128,7 @@ def assembled(path: Path, architecture: str = ARCHITECTURE) -> str:
         )
     if done.returncode:
         raise RuntimeError(f"ptxas refused {path}: {done.stderr.strip()[-1000:]}")
-    lines = [line.partition(":")[2].strip() for line in done.stderr.splitlines()]
+    lines = [line.removeprefix("ptxas info    :").strip() for line in done.stderr.splitlines()]
     return "; ".join(line for line in lines if "registers" in line or "spill" in line)
 
 
