@@ -490,7 +490,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
 def main(arguments: list[str] | None = None) -> int:
     """Run a command and return the exit code; a wrong argument is one sentence, no traceback."""
     ask = tyro.extras.subcommand_cli_from_dict
-    os.environ.setdefault("PAM_ENVS_COMPILE", "wait")  # nobody waits for a step here
+    os.environ.setdefault("PAM_ENVS_COMPILE", "wait")  # rates are of machine code
     return run_cli(
         lambda: ask(COMMANDS, prog="python -m benchmarks", args=arguments),
         "interrupted; completed work is kept: the same command resumes",

@@ -2,4 +2,4 @@
 
 import os
 
-os.environ.setdefault("PAM_ENVS_COMPILE", "wait")  # machine code is compared, not awaited
+os.environ.setdefault("PAM_ENVS_COMPILE", "wait")  # tests compare machine code

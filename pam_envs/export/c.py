@@ -385,8 +385,8 @@ def readme_body(model: Model) -> str:
     facts = "\n".join(f"- {line}" for line in model.lines)
     return f"""{facts}
 
-Parameters of effects that are switched off are left out, and those from which the environment
-derives other numbers.
+A parameter changes the plant alone: what an environment derives from its nominal plant stays as
+exported. Parameters of effects that are switched off are left out.
 
 {table("Inputs", model.inputs)}
 {table("Outputs", model.outputs)}

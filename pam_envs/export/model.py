@@ -140,11 +140,23 @@ def parameters_of(plant: Any, without: Sequence[str], block: str, first: int) ->
     """Return the parameters of a plant that have an effect, except some.
 
     ``first`` is the index of the first named parameter in ``block``. Parameters of effects that
-    are off are left out: the kernels of a plant without effects do not read them.
+    are off are left out: the kernels of a plant without effects do not read them. So are those that
+    the plant refuses to change, because they act on another variant.
     """
     from pam_envs.parameters import declarations
+    from pam_envs.plants.core.plant import UnstableParameters
+    from pam_envs.plants.core.plant_file import record
 
-    off = {name for group in plant.effects for name in group} if not plant.extended else set()
+    def accepted(name: str, value: float) -> bool:
+        try:
+            plant.replace({name: value})
+        except UnstableParameters:
+            return True
+        except ValueError:
+            return False
+        return True
+
+    off = set() if plant.extended else {*plant.names} - {*record(plant)["parameters"]}
     found = []
     for k, name in enumerate(plant.names):
         if name in without or name in off or name in plant.inert:
@@ -152,6 +164,9 @@ def parameters_of(plant: Any, without: Sequence[str], block: str, first: int) ->
         component, _, entry = name.partition(".")
         declared = declarations(getattr(plant, component))[entry]
         value = plant.value(name)
+        nearby = value + 0.01 * ((declared.high if value < declared.high else declared.low) - value)
+        if not accepted(name, nearby):
+            continue
         text = declared.source
         found.append(
             Variable(

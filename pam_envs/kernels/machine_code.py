@@ -81,7 +81,7 @@ class Source(Protocol):
 
 
 class MachineCode:
-    """Machine code of one kernel, from wherever it is at hand first."""
+    """Machine code of one kernel: shipped, cached or compiled."""
 
     def __init__(self, source: Source) -> None:
         self._source = source
@@ -97,7 +97,7 @@ class MachineCode:
         return self._run
 
     def wait(self) -> Run:
-        """Return the code, compiled in this process if there is none."""
+        """Return the code; wait until it is compiled if there is none."""
         self._run = self._run or self._stored() or load(self._compiled())
         return self._run
 

@@ -89,6 +89,18 @@ def test_parameters_of_effects_that_are_off_are_left_out() -> None:
         assert "regulator.leak" in {v.name for v in plant_model(on).parameters}
 
 
+def test_parameters_of_other_variants_are_left_out() -> None:
+    from pam_envs.plants import SingleMuscle
+
+    names = {
+        drive: {v.name for v in plant_model(SingleMuscle.mas10(f"maxwell_slip{drive}")).parameters}
+        for drive in ("", "_length")
+    }
+    assert "hysteresis.stretch" in names[""]
+    assert "hysteresis.stretch" not in names["_length"]
+    assert "hysteresis.friction" in names["_length"]
+
+
 def test_environment_in_si_has_units_of_its_signals() -> None:
     model = model_of("MusclePositioning", si=True)
     assert (model.inputs[0].unit, model.inputs[0].high) == ("Pa", 6e5)
