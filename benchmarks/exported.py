@@ -229,7 +229,7 @@ def measure(steps: int = STEPS) -> Iterator[Row]:
     for env_id in sorted(name for name in gym.registry if name.startswith("PAM/")):
         env: Any = gym.make(env_id).unwrapped
         actions = drive(env, steps)
-        wanted = expected(env, actions)
+        reference = expected(env, actions)
         model = model_of(env_id)
         _ = model.intermediates  # compiled at most once on a machine
         with tempfile.TemporaryDirectory() as work:
@@ -241,15 +241,15 @@ def measure(steps: int = STEPS) -> Iterator[Row]:
                 seconds.append(time.perf_counter() - began)
             three, two = (folder / "fmu" / f"{model.name}{end}.fmu" for end in ("", "_fmi2"))
             wasm = (folder / "wasm" / f"{model.name}.wasm").read_bytes()
-            c_bits = differing(run_c(model, folder / "c", actions), wanted)
-            wasm_bits = differing(run_wasm(model, folder / "wasm", actions), wanted)
+            c_bits = differing(run_c(model, folder / "c", actions), reference)
+            wasm_bits = differing(run_wasm(model, folder / "wasm", actions), reference)
             kernel = folder / "c" / "objects" / host_platform() / f"{model.name}_kernel.o"
             yield Row(
                 env_id,
                 c_bits,
                 wasm_bits,
-                differing(run_fmu(model, three, actions), wanted),
-                differing(run_fmu(model, two, actions), wanted),
+                differing(run_fmu(model, three, actions), reference),
+                differing(run_fmu(model, two, actions), reference),
                 sum(len(validate_fmu(str(path))) for path in (three, two)),
                 kernel.stat().st_size,
                 len(wasm),

@@ -54,14 +54,14 @@ def export_fmu(model: Model, folder: Path, platforms: Iterable[str] = ()) -> Non
         Platforms of ``toolchain.ZIG`` besides this one; they need zig.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    wanted = list(dict.fromkeys([host_platform(), *platforms]))
+    every = list(dict.fromkeys([host_platform(), *platforms]))
     with tempfile.TemporaryDirectory() as work:
         place = Path(work)
         write_sources(model, place)
         (place / "fmi_model.h").write_text(fmi_header(model), encoding="utf-8")
         for name in ("component.h", "fmi2.c", "fmi3.c"):
             (place / name).write_text((_FMI / name).read_text(encoding="utf-8"), encoding="utf-8")
-        binaries = {platform: _link(model, place, platform) for platform in wanted}
+        binaries = {platform: _link(model, place, platform) for platform in every}
     page = documentation(model)
     three = {f"binaries/{p}/{model.name}{_suffix(p)}": made[0] for p, made in binaries.items()}
     two = {
@@ -73,7 +73,7 @@ def export_fmu(model: Model, folder: Path, platforms: Iterable[str] = ()) -> Non
     if two:
         _pack(folder / f"{model.name}_fmi2.fmu", description2(model), page, two)
     (folder / "example.py").write_text(example(model), encoding="utf-8")
-    (folder / "README.md").write_text(readme(model, wanted), encoding="utf-8")
+    (folder / "README.md").write_text(readme(model, every), encoding="utf-8")
 
 
 def _suffix(platform: str) -> str:

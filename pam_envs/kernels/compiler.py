@@ -210,7 +210,7 @@ def compiled(
 ) -> Callable[..., Any]:
     """Return a dispatcher for a kernel with replaced names (see ``build.build``).
 
-    Without ``for_python`` it has no wrapper for Python and is not cached: its LLVM IR is wanted.
+    Without ``for_python`` there is no wrapper for Python and no cache: a source of LLVM IR.
     """
     names = {"prange": prange if parallel else range, **_REPLACED, **names}
     digests: dict[Any, str] = {}

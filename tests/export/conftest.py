@@ -25,11 +25,11 @@ if not COMPILED:
 
 
 class Case(NamedTuple):
-    """A model, and what Python computes for random actions."""
+    """A model, random actions, and the outputs of Python."""
 
     model: Model
     actions: Array
-    wanted: Array
+    reference: Array
 
 
 @pytest.fixture(scope="session", params=FAMILIES)

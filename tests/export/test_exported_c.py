@@ -29,7 +29,7 @@ MACHINES = {"x86_64-linux": 62, "aarch64-linux": 183, "cortex-m7": 40}
 
 def test_thousand_steps_in_c_have_the_bits_of_python(case, tmp_path: Path) -> None:
     export_c(case.model, tmp_path, [host_platform()])
-    assert differing(run_c(case.model, tmp_path, case.actions), case.wanted) == 0
+    assert differing(run_c(case.model, tmp_path, case.actions), case.reference) == 0
 
 
 def test_plant_in_c_has_the_bits_of_its_rollout(tmp_path: Path) -> None:
@@ -38,9 +38,9 @@ def test_plant_in_c_has_the_bits_of_its_rollout(tmp_path: Path) -> None:
     inputs = np.tile([v.start for v in model.inputs], (60, 1))
     inputs[:, 0] = np.repeat([3e5, 1e5, 5e5], 20)
     rows = run_c(model, tmp_path, inputs)
-    wanted = simulate(plant, inputs[:, 0])
-    assert [v.name for v in model.outputs] == [f"output.{name}" for name in wanted]
-    assert differing(rows[1:], np.array(list(wanted.values())).T.copy()) == 0
+    reference = simulate(plant, inputs[:, 0])
+    assert [v.name for v in model.outputs] == [f"output.{name}" for name in reference]
+    assert differing(rows[1:], np.array(list(reference.values())).T.copy()) == 0
     assert rows[0, 2] == 0.0 < rows[-1, 2]  # no pressure at the beginning
 
 

@@ -41,7 +41,7 @@ def test_fmu_is_valid_and_has_the_bits_of_python(case, exported: Path, name: str
 
     path = exported / name.format(case.model.name)
     assert validate_fmu(str(path)) == []
-    assert differing(run_fmu(case.model, path, case.actions), case.wanted) == 0
+    assert differing(run_fmu(case.model, path, case.actions), case.reference) == 0
 
 
 def test_simulation_with_fmpy_runs(small, tmp_path: Path) -> None:

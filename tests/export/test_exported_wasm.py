@@ -27,7 +27,7 @@ def exported(case, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_thousand_steps_in_wasm_have_the_bits_of_python(case, exported: Path) -> None:
-    assert differing(run_wasm(case.model, exported, case.actions), case.wanted) == 0
+    assert differing(run_wasm(case.model, exported, case.actions), case.reference) == 0
 
 
 def test_module_is_small_and_imports_nothing(case, exported: Path) -> None:
@@ -50,7 +50,7 @@ def test_javascript_class_gives_the_same_bits(case, exported: Path) -> None:
         check=True,
     )
     words = [[int(word, 16) for word in line.split()] for line in done.stdout.splitlines()]
-    assert differing(np.array(words, np.uint64).view(float), case.wanted) == 0
+    assert differing(np.array(words, np.uint64).view(float), case.reference) == 0
 
 
 CHECK = """

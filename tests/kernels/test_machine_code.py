@@ -181,7 +181,7 @@ def test_steps_continue_in_plain_python_until_the_code_is_ready(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     name, asked = "PAM/MusclePositioning-v0", []
-    wanted = trajectory(gym.make(name), 5, 130)
+    reference = trajectory(gym.make(name), 5, 130)
     real = MachineCode.ready
 
     def late(self: MachineCode) -> Any:
@@ -190,6 +190,6 @@ def test_steps_continue_in_plain_python_until_the_code_is_ready(
 
     monkeypatch.setattr(MachineCode, "ready", late)
     env = gym.make(name)
-    assert trajectory(env, 5, 130) == wanted
+    assert trajectory(env, 5, 130) == reference
     assert len(asked) == 130 // plant_env.INTERPRETED_CALLS
     assert env.unwrapped._compiled  # type: ignore[attr-defined]
