@@ -5,7 +5,7 @@ JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-EXTRAS := plot,baselines,agents,bench,cluster,dev
+EXTRAS := plot,baselines,agents,bench,export,cluster,dev
 INSTALL := $(BIN)/python -m pip --disable-pip-version-check --no-input install -qq
 PLAIN := tests/hysteresis tests/kernels tests/plants/test_golden_plants.py $(addprefix tests/envs/, core/test_bits.py core/test_everyday.py core/test_own_family.py test_golden_trajectories.py)
 
@@ -16,7 +16,7 @@ export SDL_VIDEODRIVER ?= dummy
 
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help venv benchmark test lint format types layers check images clean
+.PHONY: help venv benchmark test lint format types layers check images wheel clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
@@ -65,6 +65,10 @@ images: $(READY) ## Draw the pictures of the documentation
 	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --reference staircase --load 2.55 --episode-seconds 40 --plot docs/images/muscle_positioning.png
 	$(BIN)/python docs/make_images.py
 
+wheel: $(READY) ## Build the wheel with compiled code of the default configurations
+	$(BIN)/python -m pam_envs.export.shipping
+	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+
 clean: ## Remove .venv, caches and builds; results stay
-	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) build dist pam_envs/kernels/objects .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

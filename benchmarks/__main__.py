@@ -1,5 +1,6 @@
 """Command line of the benchmarks."""
 
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -334,6 +335,24 @@ def speed(only: tuple[str, ...] = (), rounds: int = 7, json: Path | None = None)
     return 0
 
 
+def export(steps: int = 1000) -> int:
+    """Export every environment, compare C, WebAssembly and FMUs with Python, and print a table.
+
+    Args:
+        steps: Control periods that are compared.
+    """
+    from benchmarks import exported
+
+    rows = []
+    with progress("environments") as start:
+        advance = start(9)
+        for row in exported.measure(steps):
+            rows.append(row)
+            advance()
+    print(exported.table(rows))
+    return int(any(row.c_bits + row.wasm_bits + row.fmu_bits + row.fmu2_bits for row in rows))
+
+
 @dataclass(frozen=True)
 class Arguments:
     """Arguments of an environment; those that are not given have its defaults."""
@@ -462,6 +481,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "effort": effort,
     "energy": energy,
     "speed": speed,
+    "export": export,
     "show": show,
     "diagnosis": diagnosis,
 }
@@ -470,6 +490,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
 def main(arguments: list[str] | None = None) -> int:
     """Run a command and return the exit code; a wrong argument is one sentence, no traceback."""
     ask = tyro.extras.subcommand_cli_from_dict
+    os.environ.setdefault("PAM_ENVS_COMPILE", "wait")  # rates are of machine code
     return run_cli(
         lambda: ask(COMMANDS, prog="python -m benchmarks", args=arguments),
         "interrupted; completed work is kept: the same command resumes",

@@ -1,4 +1,4 @@
-"""Command line: ``pam-envs list``, ``render``, ``identify``, ``diagnose``."""
+"""Command line of ``pam-envs``: list, render, identify, diagnose, export, warmup."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pam_envs.envs.registration import full_id, register_all
 from pam_envs.envs.rendering.renderer import write_film
 from pam_envs.envs.rendering.scene import view_of
+from pam_envs.export import command as exporting
 from pam_envs.hysteresis.protocol import kinds
 from pam_envs.parameters import Signals
 
@@ -236,6 +237,68 @@ def diagnose(
     print(f"wrote {out}")
 
 
+def export(
+    what: tyro.conf.Positional[str],
+    target: exporting.Format = "c",
+    out: Path = Path("exported"),
+    plant: Path | None = None,
+    hysteresis: Kind | None = None,
+    air: Literal["regulator", "flow"] | None = None,
+    reference: str | None = None,
+    si: bool = False,
+    platforms: tuple[str, ...] = (),
+) -> None:
+    """Export an environment or a plant as C, WebAssembly, FMU or PTX (docs/export.md).
+
+    Parameters
+    ----------
+    what : str
+        Id of an environment, with or without PAM/ and -v0; name of a plant; or a plant file.
+    target : str
+        "c", "wasm", "fmu" (FMI 3.0 and 2.0) or "ptx".
+    out : Path
+        Folder; the artefact gets a folder in it, by name and target.
+    plant : Path
+        Plant file of the environment.
+    hysteresis : str
+        Hysteresis model of the environment.
+    air : str
+        Air supply of the environment.
+    reference : str
+        Family of references of the environment.
+    si : bool
+        Observation and action in SI, not scaled to [-1, 1].
+    platforms : tuple of str
+        Further platforms of an FMU: x86_64-windows, aarch64-darwin, ... (needs zig).
+    """
+    model = exporting.model_of(what, plant, hysteresis, air, reference, si)
+    folder = exporting.export(model, target, out / f"{model.name}_{target}", platforms)
+    print(f"wrote {folder}, digest {model.digest[:16]}")
+
+
+def warmup(
+    ids: tyro.conf.Positional[tuple[str, ...]] = (),
+    hysteresis: Kind | None = None,
+    air: Literal["regulator", "flow"] | None = None,
+    batch: bool = True,
+) -> None:
+    """Compile environments ahead of their first use.
+
+    Parameters
+    ----------
+    ids : tuple of str
+        Ids of environments; all by default.
+    hysteresis : str
+        Hysteresis model.
+    air : str
+        Air supply.
+    batch : bool
+        Whether to compile the batch (gym.make_vec) too.
+    """
+    for line, seconds in exporting.warm_up(ids, hysteresis, air, batch):
+        print(f"{line}: {seconds:.1f} s", flush=True)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     register_all()
@@ -244,6 +307,8 @@ def main(arguments: list[str] | None = None) -> int:
         "render": render,
         "identify": identify,
         "diagnose": diagnose,
+        "export": export,
+        "warmup": warmup,
     }
     try:
         tyro.extras.subcommand_cli_from_dict(
@@ -252,7 +317,7 @@ def main(arguments: list[str] | None = None) -> int:
             prog="pam-envs",
             description="Environments for the control of pneumatic artificial muscles.",
         )
-    except (ValueError, OSError, ImportError) as error:
+    except (ValueError, OSError, ImportError, RuntimeError) as error:
         print(f"pam-envs: {error}", file=sys.stderr)
         return 2
     return 0

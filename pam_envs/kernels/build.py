@@ -85,6 +85,20 @@ def array_at(book: Any, index: int, dimensions: int, kind: int) -> Any:
     raise NotImplementedError("only compiled kernels read arrays by their address")
 
 
+def lane_view(rows: Any, lane: int) -> Any:
+    """Return rows of shape (n, N) such that ``[k][0]`` is the element of a lane.
+
+    An array of one column is the same for all lanes.
+    """
+    raise NotImplementedError("only compiled kernels view one lane of a batch")
+
+
+INTRINSICS = dict.fromkeys(
+    ("prange", "tile_view", "lane_view", "scratch", "array_at"), "of the compiler"
+)
+"""Names that the compiler replaces, for digests of a call graph."""
+
+
 def address_book(arrays: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
     """Return addresses and shapes of arrays that stay alive, four words each.
 

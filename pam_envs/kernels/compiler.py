@@ -2,18 +2,19 @@
 
 import contextlib
 import hashlib
-import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
 from numba import get_num_threads, njit, prange, types
-from numba.core import caching, cgutils
+from numba.core import caching, cgutils, event
 from numba.core.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
 from pam_envs.kernels import rebind
+from pam_envs.kernels.cache import FOLDER
+from pam_envs.kernels.notice import Notice
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
 _CALLEE: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -112,6 +113,20 @@ def _tile_view(typing: Any, tiles: Any, tile: Any, rows: Any, lanes: Any) -> Any
     return view(tiles, types.intp, rows, lanes), generate
 
 
+@intrinsic
+def _lane_view(typing: Any, rows: Any, lane: Any) -> Any:
+    """Return a view of rows that begins at the element of a lane (see ``build.lane_view``)."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        source = make_array(signature.args[0])(context, builder, arguments[0])
+        shape = cgutils.unpack_tuple(builder, source.shape)
+        shared = builder.icmp_signed("==", shape[1], context.get_constant(types.intp, 1))
+        first = builder.select(shared, context.get_constant(types.intp, 0), arguments[1])
+        return _view(context, builder, rows, builder.gep(source.data, [first]), shape)
+
+    return rows(rows, types.intp), generate
+
+
 @intrinsic(prefer_literal=True)
 def _scratch(typing: Any, rows: Any, lanes: Any) -> Any:
     """Return rows of scratch on the stack, of constant shape."""
@@ -155,20 +170,48 @@ def _array_at(typing: Any, book: Any, index: Any, dimensions: Any, kind: Any) ->
     return view(book, types.intp, dimensions, kind), generate
 
 
-_REPLACED: dict[str, Any] = {"tile_view": _tile_view, "scratch": _scratch, "array_at": _array_at}
+_REPLACED: dict[str, Any] = {
+    "tile_view": _tile_view,
+    "lane_view": _lane_view,
+    "scratch": _scratch,
+    "array_at": _array_at,
+}
 __all__ = ["compiled", "get_num_threads"]
 _DONE: dict[Any, Any] = {}
-_BASE = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-FOLDER = Path(os.environ.get("PAM_ENVS_CACHE") or Path(_BASE) / "pam_envs")
-"""Folder of compiled code."""
 _COMPILER = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:16]
 """Digest of this file: its options and intrinsics are part of the code."""
 
 
+class _Listener(event.Listener):
+    """Shows a message while a kernel is compiled, not while it is read from the disk."""
+
+    def __init__(self) -> None:
+        self._notice = Notice()
+
+    def on_start(self, event: Any) -> None:
+        """Begin the message with the name of the outermost kernel."""
+        name = event.data["dispatcher"].py_func.__name__
+        self._notice.begin(name.rpartition("_")[0])
+
+    def on_end(self, event: Any) -> None:
+        """End the message."""
+        self._notice.end()
+
+
+event.register("numba:compile", _Listener())
+
+
 def compiled(
-    function: Callable[..., Any], name: str, parallel: bool, names: dict[str, Any]
+    function: Callable[..., Any],
+    name: str,
+    parallel: bool,
+    names: dict[str, Any],
+    for_python: bool = True,
 ) -> Callable[..., Any]:
-    """Return a dispatcher for a kernel with replaced names (see ``build.build``)."""
+    """Return a dispatcher for a kernel with replaced names (see ``build.build``).
+
+    Without ``for_python`` there is no wrapper for Python and no cache: a source of LLVM IR.
+    """
     names = {"prange": prange if parallel else range, **_REPLACED, **names}
     digests: dict[Any, str] = {}
     entry_name = f"{name}_parallel" if parallel else name
@@ -182,6 +225,8 @@ def compiled(
         made.__module__ = rebind.__name__  # code from the disk imports it: no kernel's own place
         if not entry:
             return njit(forceinline=original.__pam_kernel__, **_CALLEE)(made)  # type: ignore[no-any-return]
+        if not for_python:
+            return njit(**_CALLEE)(made)  # type: ignore[no-any-return]
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
         with contextlib.suppress(RuntimeError):  # without a place to write nothing is kept
             dispatcher._cache = _Cache(made)

@@ -5,8 +5,6 @@ import math
 from pam_envs.kernels.arithmetic import log_of_fraction
 from pam_envs.kernels.build import kernel
 
-_MASK = 0xFFFFFFFF
-
 
 @kernel
 def mix(x: int) -> int:
@@ -71,15 +69,24 @@ def normal(key_a: int, key_b: int, stream: int, draw: int) -> float:
     return normal_quantile(uniform(key_a, key_b, stream, draw))
 
 
+SEED_WORDS = (0x243F6A88, 0xB7E15162)
+"""Key words before any word of the seed is absorbed."""
+
+
+@kernel
+def absorb(a: int, b: int, word: int) -> tuple[int, int]:
+    """Return two key words that depend on a further 32-bit word of the seed."""
+    a = mix(a ^ mix(word))
+    return a, mix(((b + a) & 0xFFFFFFFF) ^ mix(word ^ 0x5BF03635))
+
+
 def seed_words(seed: int) -> tuple[int, int]:
     """Return the two 32-bit key words of a non-negative integer seed of any size."""
     if seed < 0:
         raise ValueError(f"seed must be a non-negative integer, got {seed}")
-    a, b = 0x243F6A88, 0xB7E15162
+    a, b = SEED_WORDS
     while True:
-        word = seed & _MASK
-        a = int(mix(a ^ mix(word)))
-        b = int(mix((b + a) & _MASK ^ mix(word ^ 0x5BF03635)))
+        a, b = absorb(a, b, seed & 0xFFFFFFFF)
         seed >>= 32
         if not seed:
-            return a, b
+            return int(a), int(b)

@@ -71,36 +71,57 @@ def bound(function: Callable[..., Any], names: dict[str, Any], known: dict[Any, 
 
 
 def graph_digest(
-    function: Callable[..., Any], names: Mapping[str, Any], known: dict[Any, str] | None = None
+    function: Callable[..., Any],
+    names: Mapping[str, Any],
+    known: dict[Any, str] | None = None,
+    describe: Callable[[Any], list[str]] | None = None,
 ) -> str:
     """Return a digest of a call graph: the key of machine code on disk.
 
     Covers the byte code, the constants and the values of global names (replaced by ``names``) of a
     kernel and of all that it calls. Comments, docstrings, line numbers and the names of modules do
-    not matter. ``known`` holds the digests with these ``names`` so far.
+    not matter. ``known`` holds the digests with these ``names`` so far; ``describe`` returns what
+    identifies the code of one function, by default :func:`byte_code`.
     """
     known = {} if known is None else known
     if function not in known:
         known[function] = ""  # ends recursion
         code, scope = function.__code__, function.__globals__  # type: ignore[attr-defined]
-        constants = code.co_consts[1:] if function.__doc__ else code.co_consts
-        parts = [code.co_code.hex(), repr(constants), repr(code.co_names), repr(code.co_varnames)]
-        parts.append(repr(function.__defaults__))  # type: ignore[attr-defined]
+        parts = (describe or byte_code)(function)
         for used in code.co_names:
             value = names.get(used, scope.get(used))
             if isinstance(value, types.ModuleType):
                 read = {n: getattr(value, n) for n in code.co_names if hasattr(value, n)}
-                parts += [f"{n}={_value_text(v, names, known)}" for n, v in read.items()]
+                parts += [f"{n}={_value_text(v, names, known, describe)}" for n, v in read.items()]
             elif used in scope or used in names:
-                parts.append(f"{used}={_value_text(value, names, known)}")
+                parts.append(f"{used}={_value_text(value, names, known, describe)}")
         known[function] = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
     return known[function]
 
 
-def _value_text(value: Any, names: Mapping[str, Any], known: dict[Any, str]) -> str:
+def byte_code(function: Any) -> list[str]:
+    """Return byte code, constants and names of a function, which differ between Python versions."""
+    code = function.__code__
+    constants = code.co_consts[1:] if function.__doc__ else code.co_consts
+    parts = [code.co_code.hex(), repr(constants), repr(code.co_names), repr(code.co_varnames)]
+    return [*parts, repr(function.__defaults__)]
+
+
+def place(function: Any) -> list[str]:
+    """Return file and line of a function, which identify it where the files are known."""
+    code = function.__code__
+    return [code.co_filename, str(code.co_firstlineno), code.co_name, repr(function.__defaults__)]
+
+
+def _value_text(
+    value: Any,
+    names: Mapping[str, Any],
+    known: dict[Any, str],
+    describe: Callable[[Any], list[str]] | None,
+) -> str:
     """Return the value of a global name as text that is the same in every process."""
     if isinstance(value, types.FunctionType):
-        return graph_digest(value, names, known)
+        return graph_digest(value, names, known, describe)
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{value.shape}{value.tobytes().hex()}"
     if isinstance(value, int | float | str | tuple | frozenset | None):

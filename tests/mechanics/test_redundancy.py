@@ -8,7 +8,6 @@ from pam_envs.mechanics.redundancy import resolution as redundancy
 from pam_envs.mechanics.redundancy.newton import (
     across,
     bends_upwards,
-    resolve_path,
     set_curvature,
     set_equations,
     slope_and_curvature,
@@ -290,6 +289,3 @@ def test_invalid_arguments_are_refused(arguments, words):
 def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let kernels run as plain Python."""
     monkeypatch.setattr(redundancy, "COMPILED", False)
-    monkeypatch.setattr(
-        redundancy, "_built", lambda n: interpreted(resolve_path, {"N_STAGES": n, "LANES": 1})
-    )

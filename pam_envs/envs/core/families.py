@@ -7,8 +7,16 @@ from typing import Any
 
 from pam_envs.envs.core.kernels import advance_plant, trajectory_at
 from pam_envs.envs.core.layout import Report, indices
-from pam_envs.envs.core.step import MOST_PREVIEW, N_SEED, do_nothing, step_by_address, step_tiles
+from pam_envs.envs.core.step import (
+    MOST_PREVIEW,
+    N_ARRAYS,
+    N_SEED,
+    do_nothing,
+    step_by_address,
+    step_tiles,
+)
 from pam_envs.kernels.build import LANES, build, interpreted
+from pam_envs.kernels.machine_code import AddressKernel, MachineCode
 
 Kernel = Callable[..., Any]
 NONE = indices(())
@@ -83,11 +91,11 @@ class Kernels:
         """Pickle the key instead of machine code."""
         return self.maker, self.key
 
-    def _build(
-        self, lanes: int, prefix: str, function: Kernel = step_tiles, parallel: bool = False
-    ) -> Kernel:
-        name = "_".join((prefix, self.family, *map(str, self.key)))
-        return build(function, name, parallel, **{**self.names, "LANES": lanes})
+    def _name(self, prefix: str) -> str:
+        return "_".join((prefix, self.family, *map(str, self.key)))
+
+    def _build(self, prefix: str, parallel: bool = False) -> Kernel:
+        return build(step_tiles, self._name(prefix), parallel, **{**self.names, "LANES": LANES})
 
     @cached_property
     def interpreted(self) -> Kernel:
@@ -95,16 +103,22 @@ class Kernels:
         return interpreted(step_tiles, {**self.names, "LANES": 1})
 
     @cached_property
-    def single(self) -> Kernel:
-        """One environment, called with the address book of its arrays."""
-        return self._build(1, "single", step_by_address)
+    def by_address(self) -> AddressKernel:
+        """Kernel of one environment that takes the address book of its arrays."""
+        names = {**self.names, "LANES": 1}
+        return AddressKernel(self._name("single"), step_by_address, names, 4 * N_ARRAYS)
+
+    @cached_property
+    def single(self) -> MachineCode:
+        """Machine code of one environment."""
+        return MachineCode(self)
 
     @cached_property
     def batch(self) -> Kernel:
         """Tiles on one core."""
-        return self._build(LANES, "batch")
+        return self._build("batch")
 
     @cached_property
     def parallel(self) -> Kernel:
         """Tiles on all cores."""
-        return self._build(LANES, "parallel", parallel=True)
+        return self._build("parallel", parallel=True)

@@ -23,7 +23,7 @@ from pam_envs.kernels.build import COMPILED, address_book
 from pam_envs.kernels.random import seed_words
 
 INTERPRETED_CALLS = 50
-"""Steps in plain Python before an environment changes to machine code."""
+"""Steps in plain Python before an environment asks for machine code, and asks again."""
 
 
 class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -78,7 +78,8 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._run, self._compiled = function, compiled
         self._arguments: tuple[Any, ...] = (*held, 1)
         if compiled:
-            self._held, self._arguments = held, (address_book(held),)
+            book = address_book(held)
+            self._held, self._arguments = (held, book), (book.ctypes.data,)
             self._action_cells = memoryview(self._actions.ravel())
             self._reward_cell = memoryview(self._infos[0, 0])
             self._info_cells = memoryview(self._infos[0, 1:].ravel())
@@ -127,12 +128,20 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._draw(info)
         return observation, reward, terminated, truncated, info
 
+    def _change(self) -> None:
+        """Change to machine code, or try again after some steps while it is compiled."""
+        run = self.setup.kernels.single.ready()
+        if run is None:
+            self._warming = INTERPRETED_CALLS
+        else:
+            self._use(run, compiled=True)
+
     def _take(self, action: Any) -> None:
         """Check an action and pass it to the kernel."""
         if self._warming:
             self._warming -= 1
             if not self._warming:
-                self._use(self.setup.kernels.single, compiled=True)
+                self._change()
         cells, i = self._action_cells, 0
         try:
             for value in action.tolist():

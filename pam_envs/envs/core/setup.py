@@ -37,6 +37,8 @@ class Setup:
     episode_seconds: float
     render_mode: str | None = None
     view: str = ""
+    fixed_parameters: tuple[str, ...] = ()
+    """Parameters of the plant that scale the action or enter derived numbers of the setup."""
 
     @property
     def info_keys(self) -> tuple[str, ...]:
@@ -145,6 +147,7 @@ def compose(
         episode_seconds=float(given.episode_seconds),
         render_mode=given.render_mode,
         view=view,
+        fixed_parameters=tuple(drawn.fixed),
     )
 
 

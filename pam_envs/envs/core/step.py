@@ -27,7 +27,7 @@ from typing import Any
 
 from pam_envs.envs.core.layout import indices
 from pam_envs.kernels.build import LANES, array_at, kernel, prange, routine, scratch, tile_view
-from pam_envs.kernels.random import episode_key, uniform
+from pam_envs.kernels.random import SEED_WORDS, absorb, episode_key, uniform
 
 KEY_A, KEY_B, EPISODE, STEP, MEMBER = range(5)
 """Integer rows that come first in every family."""
@@ -269,6 +269,10 @@ def step_tiles(
                     )
 
 
+N_ARRAYS = 12
+"""Arrays in the address book of an environment."""
+
+
 @kernel
 def step_by_address(book: Any, mode: int) -> None:
     """Step or reset one environment, given the address book of its arrays."""
@@ -288,3 +292,14 @@ def step_by_address(book: Any, mode: int) -> None:
         1,
         mode,
     )
+
+
+@kernel
+def seed_by_address(book: Any, seed: int) -> None:
+    """Give one environment a seed of at most 63 bits, and episode 0."""
+    counts = array_at(book, 2, 3, 1)[0]
+    a, b = absorb(SEED_WORDS[0], SEED_WORDS[1], seed & 0xFFFFFFFF)
+    if seed >> 32:
+        a, b = absorb(a, b, seed >> 32)
+    counts[N_COUNTS - N_SEED][0], counts[N_COUNTS - N_SEED + 1][0] = a, b
+    counts[EPISODE][0] = 0

@@ -6,7 +6,6 @@ fluidic_muscles, section 2. The weight grows without bound towards the limits, s
 optimum within them is always found; the unweighted variant minimises ``q'q`` and has no limits.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -15,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.arrays import Array
-from pam_envs.kernels.build import COMPILED, build
+from pam_envs.kernels.build import COMPILED, address_book, array_at, interpreted, kernel
+from pam_envs.kernels.machine_code import AddressKernel, MachineCode
 from pam_envs.mechanics.redundancy.newton import TASK, resolve_path
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.mechanics.serial_chain.kernels import work_rows
@@ -137,7 +137,7 @@ def resolve(
     angles, found, iterations = np.zeros((m, n)), np.zeros((m, TASK)), np.zeros(m, np.int64)
     sizes = ((work_rows(n), 1), (n + TASK, n + TASK + 1), (n, n), (n + TASK,))
     arrays = [given, q, forces, chain.rows()[:, None].copy(), *map(np.zeros, sizes)]
-    done = _call(_built(n), arrays, (limit, weighted, known), [angles, found, iterations])
+    done = _resolve(n, arrays, limit, weighted, known, [angles, found, iterations])
     if done < m:
         raise UnreachablePose(done, given[done], *nearest(chain, given[done], limit), limit)
     return Resolution(angles, found, iterations, limit)
@@ -165,22 +165,73 @@ def nearest(chain: SerialChain, pose: ArrayLike, limit: float = LIMIT) -> tuple[
     return best
 
 
+WEIGHTED, KNOWN = 1, 2
+"""Flags of the mode of :func:`resolve_by_address`."""
+N_ARRAYS = 13
+
+
+@kernel
+def resolve_by_address(book: Any, mode: int) -> None:
+    """Resolve a path, given the address book of its arrays, the limit [rad] and the result."""
+    limit, done = array_at(book, 11, 1, 0), array_at(book, 12, 1, 1)
+    done[0] = resolve_path(
+        array_at(book, 0, 2, 0),
+        array_at(book, 1, 2, 0),
+        array_at(book, 2, 1, 0),
+        array_at(book, 3, 2, 0),
+        array_at(book, 4, 2, 0),
+        array_at(book, 5, 2, 0),
+        array_at(book, 6, 2, 0),
+        array_at(book, 7, 1, 0),
+        limit[0],
+        (mode & WEIGHTED) > 0,
+        (mode & KNOWN) > 0,
+        array_at(book, 8, 2, 0),
+        array_at(book, 9, 2, 0),
+        array_at(book, 10, 1, 1),
+    )
+
+
+@dataclass(frozen=True)
+class PathKernel:
+    """Kernel that resolves the paths of chains with a number of joints."""
+
+    stages: int
+
+    @property
+    def names(self) -> dict[str, Any]:
+        """Values of global names in its call graph."""
+        return {"N_STAGES": self.stages, "LANES": 1}
+
+    @property
+    def by_address(self) -> AddressKernel:
+        """The kernel."""
+        name = f"resolve_path_{self.stages}"
+        return AddressKernel(name, resolve_by_address, self.names, 4 * N_ARRAYS)
+
+
 @lru_cache(maxsize=16)
-def _built(stages: int) -> Callable[..., Any]:
-    return build(resolve_path, f"resolve_path_{stages}", N_STAGES=stages, LANES=1)
+def code_of(stages: int) -> MachineCode:
+    """Return the machine code for a number of joints."""
+    return MachineCode(PathKernel(stages))
 
 
-def _call(
-    function: Callable[..., Any], arrays: list[Any], values: tuple[Any, ...], outputs: list[Any]
+def _resolve(
+    stages: int, arrays: list[Any], limit: float, weighted: bool, known: bool, outputs: list[Any]
 ) -> int:
-    """Call a kernel that fills ``outputs``, with lists where it is not compiled."""
+    """Call the kernel, which fills ``outputs``; with lists where it is not compiled."""
     if COMPILED:
-        return int(function(*arrays, *values, *outputs))
+        done, mode = np.zeros(1, np.int64), WEIGHTED * weighted + KNOWN * known
+        held = [*arrays, *outputs, np.array([limit]), done]
+        book = address_book(held)
+        code_of(stages).wait()(book.ctypes.data, mode)
+        return int(done[0])
     lists = [array.tolist() for array in outputs]
-    done = int(function(*(array.tolist() for array in arrays), *values, *lists))
-    for array, filled in zip(outputs, lists, strict=True):
-        array[...] = filled
-    return done
+    function = interpreted(resolve_path, PathKernel(stages).names)
+    filled = int(function(*(a.tolist() for a in arrays), limit, weighted, known, *lists))
+    for array, values in zip(outputs, lists, strict=True):
+        array[...] = values
+    return filled
 
 
 def _checked_poses(chain: SerialChain, poses: ArrayLike, limit: float) -> Array:

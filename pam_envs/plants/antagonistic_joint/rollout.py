@@ -83,6 +83,11 @@ def channels_of(plant: AntagonisticJoint) -> dict[str, float]:
     return dict.fromkeys(names, 0.0) | {"prestress": plant.prestress}
 
 
+def outputs_of(plant: AntagonisticJoint) -> tuple[str, ...]:
+    """Return the names of the outputs, in the order of the loop."""
+    return tuple(OUTPUTS)
+
+
 def readings_of(plant: AntagonisticJoint) -> dict[str, int]:
     """Return the row of each sensor's bias, by name."""
     gauges = dict.fromkeys(("pressure_a", "pressure_b"), K.PRESSURE_BIAS)

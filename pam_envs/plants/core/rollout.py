@@ -17,6 +17,7 @@ from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import (
     COMPILED,
     LANES,
+    array_at,
     build,
     interpreted,
     kernel,
@@ -136,6 +137,35 @@ def run_plants(
                 write_outputs(rows, fixed, outputs, t, first, lanes)
 
 
+N_ARRAYS = 10
+"""Arrays in the address book of a plant: those of :func:`run_plants`, numbers, period [s]."""
+ELEMENTS, SUBSTEPS, BEGUN, BEFORE = range(4)
+"""Whole numbers of a plant's address book, the last arguments of :func:`run_plants`."""
+
+
+@kernel
+def run_by_address(book: Any, flag: int) -> None:
+    """Run one plant through one control period, given the address book of its arrays."""
+    flags, numbers = array_at(book, 6, 1, 1), array_at(book, 8, 1, 1)
+    flags[0] = flag
+    run_plants(
+        array_at(book, 0, 3, 0),
+        array_at(book, 1, 3, 0),
+        array_at(book, 2, 3, 1),
+        array_at(book, 3, 3, 0),
+        array_at(book, 4, 2, 0),
+        array_at(book, 5, 3, 0),
+        flags,
+        array_at(book, 7, 3, 0),
+        numbers[ELEMENTS],
+        numbers[SUBSTEPS],
+        array_at(book, 9, 1, 0)[0],
+        numbers[BEGUN],
+        numbers[BEFORE],
+    )
+    numbers[BEGUN] = numbers[BEGUN] + 1
+
+
 @dataclass(frozen=True)
 class Loop:
     """Loop of a variant of a plant.
@@ -171,19 +201,23 @@ class Loop:
         counts = np.zeros((tiles, self.counts, lanes), np.int64)
         return np.zeros((tiles, self.rows, lanes)), counts
 
+    def names(self, lanes: int) -> dict[str, Any]:
+        """Return the values of global names in the call graph of the loop."""
+        return {
+            "N_ROWS": self.rows,
+            "N_PARAMETERS": self.parameters,
+            "N_COUNTS": self.counts,
+            "N_WORK": self.work,
+            "LANES": lanes,
+            "OUTPUT_ROWS": tuple(self.outputs),
+            **self.kernels,
+        }
+
     def function(self, lanes: int, parallel: bool, compiled: bool) -> Callable[..., Any]:
         """Return the loop ready to call, built once for each variant and number of lanes."""
         key = (self.name, lanes, parallel, compiled)
         if key not in _BUILT:
-            names = {
-                "N_ROWS": self.rows,
-                "N_PARAMETERS": self.parameters,
-                "N_COUNTS": self.counts,
-                "N_WORK": self.work,
-                "LANES": lanes,
-                "OUTPUT_ROWS": tuple(self.outputs),
-                **self.kernels,
-            }
+            names = self.names(lanes)
             if compiled:
                 _BUILT[key] = build(run_plants, f"run_{self.name}_{lanes}", parallel, **names)
             else:

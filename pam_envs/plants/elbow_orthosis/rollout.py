@@ -74,6 +74,11 @@ def channels_of(plant: ElbowOrthosis) -> dict[str, float]:
     return dict.fromkeys(names, 0.0) | {"intent": 1.0}
 
 
+def outputs_of(plant: ElbowOrthosis) -> tuple[str, ...]:
+    """Return the names of the outputs, in the order of the loop."""
+    return tuple(OUTPUTS)
+
+
 def readings_of(plant: ElbowOrthosis) -> dict[str, int]:
     """Return the row of each sensor's bias, by name."""
     gauges = dict.fromkeys(("pressure_a", "pressure_b"), K.PRESSURE_BIAS)

@@ -65,6 +65,11 @@ def channels_of(plant: KneeOrthosis) -> dict[str, float]:
     return {"set_point": 0.0, "phase": 0.0, "pressure": 0.0}
 
 
+def outputs_of(plant: KneeOrthosis) -> tuple[str, ...]:
+    """Return the names of the outputs, in the order of the loop."""
+    return tuple(OUTPUTS)
+
+
 def readings_of(plant: KneeOrthosis) -> dict[str, int]:
     """Return the row of each sensor's bias, by name."""
     return {name: K.place(f"{name}.bias") for name in K.SENSORS}

@@ -51,6 +51,12 @@ def channels_of(plant: RedundantManipulator) -> dict[str, float]:
     return {"payload": 0.0, "prestress": plant.prestress} | dict.fromkeys(commands, 0.0)
 
 
+def outputs_of(plant: RedundantManipulator) -> tuple[str, ...]:
+    """Return the names of the outputs, in the order of the loop."""
+    joints = [f"{name}_{k}" for name in JOINT_OUTPUTS for k in range(plant.stages)]
+    return (*joints, *(f"{name}_{m}" for name in MUSCLE_OUTPUTS for m in range(2 * plant.stages)))
+
+
 def readings_of(plant: RedundantManipulator) -> dict[str, int]:
     """Return the row of each sensor's bias, by name."""
     angles = {f"angle_{k}": M.ANGLE_BIAS for k in range(plant.stages)}

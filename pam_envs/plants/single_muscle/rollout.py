@@ -116,6 +116,11 @@ def channels_of(plant: SingleMuscle) -> dict[str, float]:
     return dict.fromkeys(names, 0.0) | usual
 
 
+def outputs_of(plant: SingleMuscle) -> tuple[str, ...]:
+    """Return the names of the outputs, in the order of the loop."""
+    return OUTPUTS
+
+
 def readings_of(plant: SingleMuscle) -> dict[str, int]:
     """Return the row of each sensor's bias, by name."""
     return {"contraction": R.POSITION_BIAS, "pressure": R.PRESSURE_BIAS}

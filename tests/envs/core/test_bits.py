@@ -104,7 +104,7 @@ def digest() -> str:
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
-@pytest.mark.parametrize("compile_kernels", ["0", "1"] if COMPILED else ["0"])
+@pytest.mark.parametrize("compile_kernels", ["0", "wait"] if COMPILED else ["0"])
 def test_other_processes_and_plain_python_give_the_same_bits(compile_kernels: str) -> None:
     code = "from tests.envs.core.test_bits import digest; print(digest())"
     run = subprocess.run(

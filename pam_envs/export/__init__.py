@@ -1,0 +1,1 @@
+"""Export of environments and plants as C, WebAssembly, FMU or PTX, from their own kernels."""

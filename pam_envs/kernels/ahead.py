@@ -1,0 +1,39 @@
+"""Compile one kernel into the cache: ``python -m pam_envs.kernels.ahead``, pickle on stdin."""
+
+import lzma
+import os
+import pickle
+import sys
+
+from pam_envs.kernels import emission, intermediate
+from pam_envs.kernels.cache import FOLDER, write_whole
+from pam_envs.kernels.machine_code import BUSY, Source, is_busy
+
+
+def main() -> int:
+    """Write IR and object code of a kernel; return the exit code."""
+    if hasattr(os, "nice"):
+        os.nice(10)
+    source: Source = pickle.load(sys.stdin.buffer)
+    kernel = source.by_address
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    if not is_busy(kernel.busy_file):
+        kernel.busy_file.unlink(missing_ok=True)
+    try:
+        kernel.busy_file.touch(exist_ok=False)
+    except FileExistsError:
+        return BUSY
+    try:
+        if kernel.ir_file.exists():
+            text = lzma.decompress(kernel.ir_file.read_bytes()).decode()
+        else:
+            text = intermediate.intermediate(kernel.function, kernel.names, kernel.words)
+            write_whole(kernel.ir_file, lzma.compress(text.encode(), preset=6))
+        write_whole(kernel.object_file(), emission.emit(text, emission.host()))
+    finally:
+        kernel.busy_file.unlink(missing_ok=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,247 @@
+"""Machine code of kernels that take an address book: shipped, cached, or compiled once.
+
+Loading it needs llvmlite but not numba. Where there is none, a child process compiles it while the
+caller continues in plain Python, with the same bits. ``PAM_ENVS_COMPILE=wait`` compiles at once.
+"""
+
+import atexit
+import ctypes
+import hashlib
+import lzma
+import os
+import pickle
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol
+
+from pam_envs.kernels import shipped
+from pam_envs.kernels.build import INTRINSICS
+from pam_envs.kernels.cache import FOLDER, write_whole
+from pam_envs.kernels.notice import Notice, announce
+from pam_envs.kernels.rebind import graph_digest
+
+Run = Callable[[int, int], None]
+"""Takes the address of an address book, and a mode."""
+BUSY = 3
+"""Exit code of a child whose work another process is doing."""
+STALE = 600.0
+"""Age [s] at which the mark of a process that compiles is taken for that of a dead one."""
+_TOOLS = ("compiler.py", "intermediate.py")
+_LOADED: list[Any] = []  # engines, which own the code
+
+
+@dataclass(frozen=True)
+class AddressKernel:
+    """A kernel that takes an address book and a mode, with the names that are bound in it."""
+
+    name: str
+    """Name, also of its files."""
+    function: Callable[[Any, int], None]
+    names: Mapping[str, Any]
+    words: int
+    """Length of the address book."""
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the call graph and of the tools that make its LLVM IR."""
+        graph = graph_digest(self.function, {**self.names, **INTRINSICS})
+        tools = b"".join(Path(__file__).with_name(name).read_bytes() for name in _TOOLS)
+        return hashlib.sha256(graph.encode() + tools).hexdigest()[:16]
+
+    @property
+    def ir_file(self) -> Path:
+        """File of the LLVM IR, the same on every machine."""
+        return FOLDER / f"{self.name}_{self.digest}.ll.xz"
+
+    @property
+    def busy_file(self) -> Path:
+        """Mark of a process that compiles."""
+        return FOLDER / f"{self.name}_{self.digest}.busy"
+
+    def object_file(self) -> Path:
+        """Return the file of the object code for this processor."""
+        from pam_envs.kernels import emission
+
+        tool = Path(emission.__file__).read_bytes()
+        key = hashlib.sha256(repr(emission.host()).encode() + tool).hexdigest()[:8]
+        return FOLDER / f"{self.name}_{self.digest}_{key}.o"
+
+
+class Source(Protocol):
+    """Something picklable that builds the kernel again in another process."""
+
+    @property
+    def by_address(self) -> AddressKernel:
+        """The kernel."""
+
+
+class MachineCode:
+    """Machine code of one kernel: shipped, cached or compiled."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._run: Run | None = None
+        self._child: subprocess.Popen[bytes] | None = None
+
+    def ready(self) -> Run | None:
+        """Return the code, or None while a child process compiles it."""
+        if self._run is None:
+            self._run = self._stored()
+        if self._run is None and (waiting() or not self._in_background()):
+            self._run = load(self._compiled())
+        return self._run
+
+    def wait(self) -> Run:
+        """Return the code; wait until it is compiled if there is none."""
+        self._run = self._run or self._stored() or load(self._compiled())
+        return self._run
+
+    def _stored(self) -> Run | None:
+        """Return code that was shipped with the package or cached on this machine."""
+        kernel = self._source.by_address
+        data = shipped.find(kernel)
+        if data is None:
+            try:
+                data = kernel.object_file().read_bytes()
+            except OSError:
+                return None
+        return load(data)
+
+    def _compiled(self) -> bytes:
+        """Compile and wait; keep the code where that is possible."""
+        from pam_envs.kernels import emission, intermediate
+
+        kernel, notice = self._source.by_address, Notice()
+        notice.begin(kernel.name)
+        try:
+            text = intermediate_of(self._source)
+        except RuntimeError:  # the family cannot be imported, or nothing can be written
+            text = ""
+        finally:
+            notice.end()
+        text = text or intermediate.intermediate(kernel.function, kernel.names, kernel.words)
+        data = emission.emit(text, emission.host())
+        try:
+            write_whole(kernel.object_file(), data)
+        except OSError:
+            announce(f"{FOLDER} cannot be written, so code is not kept: set PAM_ENVS_CACHE")
+        return data
+
+    def _in_background(self) -> bool:
+        """Return whether another process compiles; start one if there is none yet."""
+        kernel = self._source.by_address
+        if self._child is not None:
+            code = self._child.poll()
+            if code not in (None, BUSY):
+                return False  # it failed, or compiled something else: try in this process
+            if code is None:
+                return True
+            self._child = None
+        if is_busy(kernel.busy_file):
+            return True
+        self._child = start(self._source)
+        if self._child is None:
+            return False
+        announce(
+            f"compiling {kernel.name} in the background, once on this machine; until then "
+            "steps run in plain Python with the same results ('pam-envs warmup' compiles ahead)"
+        )
+        return True
+
+
+def waiting() -> bool:
+    """Return whether the caller waits for a compilation (``PAM_ENVS_COMPILE=wait``)."""
+    return os.environ.get("PAM_ENVS_COMPILE", "").lower() == "wait"
+
+
+def load(data: bytes) -> Run:
+    """Return the function of an object file, which releases the lock of the interpreter."""
+    import llvmlite.binding as llvm
+
+    from pam_envs.kernels.emission import host
+    from pam_envs.kernels.intermediate import ENTRY
+
+    target = host()
+    machine = llvm.Target.from_triple(target.triple).create_target_machine(
+        cpu=target.cpu, features=target.features, jit=True
+    )
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    code = llvm.object_file.ObjectFileRef.from_data(data)
+    engine.add_object_file(code)
+    engine.finalize_object()
+    _LOADED.append((engine, code, machine))
+    signature = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)
+    return signature(engine.get_function_address(ENTRY))
+
+
+def is_busy(mark: Path) -> bool:
+    """Return whether a process that may be alive has set a mark."""
+    try:
+        return time.time() - mark.stat().st_mtime < STALE
+    except OSError:
+        return False
+
+
+def start(source: Source) -> "subprocess.Popen[bytes] | None":
+    """Start a process that compiles a kernel into the cache; None if that is impossible."""
+    from pam_envs.kernels.intermediate import GENERIC
+
+    try:
+        job = pickle.dumps(source)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return None
+    path = os.pathsep.join(p or os.getcwd() for p in sys.path)
+    environment = {**os.environ, **GENERIC, "PYTHONPATH": path, "PAM_ENVS_CACHE": str(FOLDER)}
+    try:
+        child = subprocess.Popen(
+            [sys.executable, "-m", "pam_envs.kernels.ahead"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            start_new_session=True,
+        )
+        assert child.stdin is not None
+        child.stdin.write(job)
+        child.stdin.close()
+    except OSError:
+        return None
+    atexit.register(_leave, child)
+    return child
+
+
+def _leave(child: "subprocess.Popen[bytes]") -> None:
+    """Let a child finish after this process, so that the next one finds the code."""
+    if child.poll() is None:
+        child.returncode = 0  # no warning about a process that still runs
+
+
+def intermediate_of(source: Source) -> str:
+    """Return the LLVM IR of a kernel, from the cache or from a child process.
+
+    Raises
+    ------
+    RuntimeError
+        If the child process cannot build the kernel.
+    """
+    kernel = source.by_address
+    deadline = time.monotonic() + STALE
+    while not kernel.ir_file.exists():
+        code: int | None = BUSY
+        if not is_busy(kernel.busy_file):
+            child = start(source)
+            code = None if child is None else child.wait()
+            if code == 0 and kernel.ir_file.exists():
+                break
+        if code != BUSY or time.monotonic() > deadline:
+            raise RuntimeError(
+                f"{kernel.name} could not be compiled in a process of its own (exit code {code}): "
+                f"its family has to be importable, and {FOLDER} writable (PAM_ENVS_CACHE)"
+            )
+        time.sleep(0.2)
+    return lzma.decompress(kernel.ir_file.read_bytes()).decode()
