@@ -289,6 +289,23 @@ def papers(
     return 1 if any(figure.unexplained for figure in figures) else 0
 
 
+def bound(track: Positional[tuple[str, ...]], episodes: int = 4, horizon: int = 60) -> int:
+    """Bound the error of tracks from below: a clairvoyant controller that knows plant and future.
+
+    Args:
+        track: Names of scenario files.
+        episodes: Number of episodes of each scenario.
+        horizon: Control periods that are predicted.
+    """
+    from benchmarks.bounds import run as bounding
+
+    for chosen in _choose(track, scenarios.available(), "track"):
+        with progress("scenarios") as start:
+            found = bounding.bounds_of(chosen, episodes, horizon, start(len(chosen.scenarios())))
+        print(bounding.table(chosen, found), flush=True)
+    return 0
+
+
 def effort(seeds: int = 10, wearer: Literal["prescribed", "adaptive"] = "prescribed") -> int:
     """Print the EMG-proxy effort of gaits: no, perfect and random assistance.
 
@@ -478,6 +495,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "show-row": show_row,
     "tune": tune,
     "papers": papers,
+    "bound": bound,
     "effort": effort,
     "energy": energy,
     "speed": speed,

@@ -77,6 +77,10 @@ class KneeNominal:
         """Return the hysteresis state after a pressure [Pa]."""
         return self.hysteresis.forward(pressure, state)[1]
 
+    def stiffness_after(self, pressure: Array, state: RowsState) -> Array:
+        """Return the stiffness [N/m] at a pressure [Pa] that the history ends with."""
+        return self._per_output * self.hysteresis.forward(pressure, state)[0]
+
     def pressure_for(self, stiffness: Array, state: RowsState) -> Array:
         """Return the pressure [Pa], within the capacity, for a stiffness [N/m] after a history."""
         found = self.hysteresis.inverse(stiffness / self._per_output, state)

@@ -27,6 +27,7 @@ RIG = fit_rational(FREQUENCIES, 1.2 / (1.0 + 0.05j * FREQUENCIES), 1)
 ENVS = (
     "PAM/MusclePositioning-v0",
     "PAM/KneeStiffness-v0",
+    "PAM/KneeWalk-v0",
     "PAM/AntagonisticJoint-v0",
     "PAM/ElbowOrthosis-v0",
 )

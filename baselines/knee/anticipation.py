@@ -1,0 +1,289 @@
+"""Anticipating inverse: the inverse of the knee orthosis over a preview horizon.
+
+    plan, shifted -> tensions over the horizon -> inverse hysteresis -> pressures p*_k
+    -> best rate-limited path -> inverse lag -> setpoint, one dead time ahead
+
+The inverse of yeh2010 is static, and switches between swing and stance when the heel load is
+sensed. The regulator then needs dead time, lag and, for the fall of the tension after heel contact,
+0.3 s at its rate limit. Here the nominal pressure is that at which a setpoint takes effect, one
+dead time ahead. From there on, the path of the pressure is the best one within the rate limit
+(:mod:`baselines.predictive.rate_limited`), with a small weight in swing, where the tension is not
+tracked. Heel contact and toe-off are those of the plan, shifted by the wearer's phase
+(:mod:`baselines.knee.plan`): the switch is anticipated and not sensed.
+
+A planned sample is in stance where it differs from the tension of zero torque at the planned angle.
+In swing both are equal but for a constant offset, which is observed there.
+
+With feedback, a PI compares the sensed tension with that of the nominal muscle under the same
+commands at the sensed angle, one dead time late. With an exact model it is at rest: it starts at
+zero and does not counteract the anticipation.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from baselines.core.controller import (
+    Prediction,
+    Reader,
+    RowController,
+    Rows,
+    encode_action,
+    preview_names,
+    reader,
+)
+from baselines.core.entry import KNEE, Bounds, Entry, Spec
+from baselines.knee.nominal import KneeObserver, KneeView, make_knee_observer
+from baselines.knee.plan import SCALES, PhaseFilter, Plan
+from baselines.predictive.preview import PreviewMemory
+from baselines.predictive.rate_limited import best_path
+from baselines.predictive.regulator import BankState, RegulatorBank
+from pam_envs.arrays import Array
+from pam_envs.hysteresis.protocol import RowsState
+from pam_envs.parameters import Signal
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+
+SWING = 0.02
+"""Weight of a squared error of the tension in swing over that in stance."""
+UNKNOWN = 0.3
+"""Weight of samples that are neither previewed nor remembered."""
+BLOCKS = (1,) * 8 + (2,) * 6 + (4,) * 10
+"""Control periods between the nodes of the horizon: 0.6 s."""
+ANGLE_NOISE = 0.01
+"""Difference [rad] of the path from the plan."""
+TORQUE_NOISE = 0.4
+"""Difference [N m] of the torque in stance from the plan."""
+USUAL_STRETCH = 0.05
+"""Stretch [m] whose errors of the tension have the weight 1."""
+KEPT = 60.0
+"""Time constant [periods] for which the reference keeps its distance from the plan."""
+MISMATCH = 0.1
+"""Likelihood that the plan is in stance and the wearer not, or the reverse, at the right shift."""
+SPREAD = 0.5**0.5
+"""Standard deviation of a stride's beginning over that of durations."""
+ENDS = np.cumsum(BLOCKS).astype(float)
+"""Nodes of the horizon [periods] from when a setpoint takes effect."""
+MEMORY = 200.0
+"""Time constant [periods] of the moments that give the gain."""
+USUAL = MEMORY * 100.0**2
+"""Moments [N2] of the nominal gain at the start."""
+SMALLEST = 0.5
+"""Difference [N] from zero torque that counts as stance."""
+KNOBS: Bounds = {"swing": (0.1, 10.0)}
+
+
+Correction = Callable[[Array], Array]
+"""From times of the plan [control periods], (n_env, n_times), to tensions [N]."""
+
+
+class AnticipationState(NamedTuple):
+    """States of regulator, hysteresis and plan, offset of the reference in swing [N], and moments.
+
+    ``moments``, shape (n_env, 2), are the sums of squares of the nominal tension, and of its
+    product with the sensed one [N2].
+    """
+
+    bank: BankState
+    hysteresis: RowsState
+    plan: Plan
+    offset: Array
+    moments: Array
+
+
+@dataclass(frozen=True)
+class KneeAnticipation(RowController):
+    """Anticipating inverse; see the module.
+
+    Attributes
+    ----------
+    observer : KneeObserver
+        Reader of the signals, and the nominal orthosis.
+    phase : PhaseFilter
+        Previewed stride, and the wearer's shift in it.
+    channels : tuple of Reader
+        Readers of the previewed reference, and of the previewed angle with a gait.
+    torque : Reader, optional
+        Reader of the torque reference of a gait.
+    pressure : Reader
+        Reader of the sensed pressure.
+    bank : RegulatorBank
+        Candidates of the regulator, or the nominal one.
+    swing : float
+        Weight of a squared error in swing over that in stance.
+    adaptive : bool
+        Whether regulator and gain are estimated.
+    """
+
+    observer: KneeObserver
+    phase: PhaseFilter
+    channels: tuple[Reader, ...]
+    torque: Reader | None
+    pressure: Reader
+    bank: RegulatorBank
+    swing: float
+    adaptive: bool
+    action_signal: Signal
+
+    def initial_state(self, observation: ArrayLike) -> AnticipationState:
+        """Return the state at rest under the present setpoint."""
+        view, plan = self.observer.read(observation), self.phase.start(self._samples(observation))
+        return AnticipationState(
+            self.bank.start(view.set_point),
+            self.observer.nominal.inflated(view.set_point),
+            plan,
+            np.zeros_like(view.set_point),
+            np.full((len(view.set_point), 2), USUAL),
+        )
+
+    def respond(self, observation: ArrayLike, state: AnticipationState) -> Prediction:
+        """Return the action and the next state."""
+        return self.answer(observation, self.observed(observation, state))
+
+    def answer(
+        self, observation: ArrayLike, now: AnticipationState, more: Correction | None = None
+    ) -> Prediction:
+        """Return the action and the next state after :meth:`observed`.
+
+        ``more`` returns a correction [N] of the tension in stance at times of the plan.
+        """
+        view, signal = self.observer.read(observation), self.action_signal
+        arrival = self.bank.arrival(now.bank)
+        later = now.hysteresis
+        for pressure in arrival.pressures:
+            later = self.observer.nominal.advance(pressure, later)
+        ends = arrival.delay[:, None] + ENDS
+        stiffness, weight = self._demands(view, now, ends, more)
+        stiffness = stiffness * (now.moments[:, 0] / now.moments[:, 1])[:, None]
+        held = tuple(np.repeat(part, len(ENDS), axis=0) for part in later)
+        path = self.observer.nominal.pressure_for(stiffness.ravel(), held)
+        reach = (arrival.rate * self.bank.period)[:, None] * np.array(BLOCKS, float)
+        start = arrival.pressures[-1]
+        following = best_path(start, path.reshape(stiffness.shape), weight, reach)[:, 0]
+        command = arrival.set_point(following, self.bank.period)
+        command = np.minimum(np.maximum(command, signal.low), signal.high)
+        after = now._replace(bank=self.bank.advance(now.bank, command))
+        return encode_action(signal, command, observation), after
+
+    def _samples(self, observation: ArrayLike) -> Array:
+        """Return the previewed channels, shape (n_env, n_channels, n_samples)."""
+        return np.array([r.rows(observation).T for r in self.channels]).swapaxes(0, 1)
+
+    def observed(self, observation: ArrayLike, state: AnticipationState) -> AnticipationState:
+        """Return the state with what an observation shows of plan, wearer and plant."""
+        view = self.observer.read(observation)
+        nominal, bank, moments = self.observer.nominal, state.bank, state.moments
+        if self.adaptive:
+            bank = self.bank.observe(bank, self.pressure.rows(observation)[0])
+        pressure = self.bank.now(bank)
+        hysteresis = nominal.advance(pressure, state.hysteresis)
+        if self.adaptive:
+            stiffness = nominal.stiffness_after(pressure, hysteresis)
+            expected = np.maximum(stiffness, 0.0) * view.stretch
+            products = expected[:, None] * np.stack([expected, view.tension], axis=1)
+            moments = (1.0 - 1.0 / MEMORY) * moments + products
+            moments = np.clip(moments, moments[:, :1] / 2.0, moments[:, :1] * 2.0)
+        plan = self.phase.add(state.plan, self._samples(observation))
+        now = AnticipationState(bank, hysteresis, plan, state.offset, moments)
+        if not self.observer.gait:
+            return now
+        plan = self.phase.follow(plan, partial(self._likelihood, view, observation, now))
+        free = nominal.free_tension(view.angle)
+        swing = ~view.stance & (free > SMALLEST)
+        offset = np.where(swing, view.reference - free, state.offset)
+        return now._replace(plan=plan, offset=offset)
+
+    def _likelihood(
+        self, view: KneeView, observation: ArrayLike, now: AnticipationState, samples: Array
+    ) -> Array:
+        """Return the likelihood of an observation for planned samples."""
+        assert self.torque is not None
+        tension, angle = samples[:, 0], samples[:, 1]
+        planned, stance = self._in_stance(tension, angle, now), view.stance[:, None]
+        torque = self.observer.nominal.plant.lever.torque(tension, angle)
+        given = self.torque.rows(observation)[0][:, None, None]
+        off = (given - SCALES[:, None] * torque[:, None]) / TORQUE_NOISE
+        path = ((view.angle_reference[:, None] - angle) / ANGLE_NOISE)[:, None]
+        fit = np.exp(-0.5 * np.where(stance[..., None], off, path) ** 2)
+        sure = np.where(stance, MISMATCH, MISMATCH * fit[:, 0])[:, None]
+        return np.where((planned == stance)[:, None], fit, sure)
+
+    def _demands(
+        self, view: KneeView, now: AnticipationState, ends: Array, more: Correction | None
+    ) -> tuple[Array, Array]:
+        """Return stiffnesses [N/m] and weights at the nodes, shape (n_env, n_nodes)."""
+        nominal, plan = self.observer.nominal, now.plan
+        samples, known = self.phase.read(plan, ends)
+        weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
+        if not self.observer.gait:
+            tension = samples[:, 0]
+            stretch = nominal.stretch(nominal.angle_of(tension))
+            stiffness = tension if self.observer.stiffness else tension / stretch
+            return np.maximum(stiffness, 0.0), weight
+        tension, angle = samples[:, 0], samples[:, 1]
+        here, _ = self.phase.read(plan, np.zeros((len(ends), 1)))
+        deviation = view.angle - here[:, 1, 0]
+        free = nominal.free_tension(angle)
+        stance = self._in_stance(tension, angle, now)
+        together = view.stance & self._in_stance(here[:, 0], here[:, 1], now)[:, 0]
+        excess = np.where(together, view.reference - here[:, 0, 0], 0.0)
+        tension = tension + excess[:, None] * np.exp(-ends / KEPT)
+        if more is not None:
+            tension = tension + more(self.phase.present(plan)[:, None] + ends)
+        stretch = nominal.stretch(angle + deviation[:, None])
+        weight = weight * np.where(stance, 1.0, self.swing) * (stretch / USUAL_STRETCH) ** 2
+        return np.where(stance, np.maximum(tension, 0.0), free) / stretch, weight
+
+    def _in_stance(self, tension: Array, angle: Array, now: AnticipationState) -> Rows:
+        """Return where planned samples are in stance, shape (n_env, n_times)."""
+        free = self.observer.nominal.free_tension(angle)
+        return np.asarray(np.abs(tension - free - now.offset[:, None]) > SMALLEST)
+
+
+def make_knee_anticipation(spec: Spec[KneeOrthosis], adaptive: bool = False) -> KneeAnticipation:
+    """Return the controller; ``adaptive``: whether regulator and gain are estimated."""
+    observer, signals, plant = make_knee_observer(spec), spec.signals, spec.plant
+    period, gait = plant.control_period, observer.gait
+    names = [preview_names("reference", signals)]
+    if gait:
+        names.append(preview_names("angle_reference", signals))
+    ahead = np.array([round(signals[name].ahead / period) for name in names[0]])
+    stride = plant.stride.time / period if gait else np.inf
+    spread = SPREAD * plant.stride.variability * stride if gait else 0.0
+    return KneeAnticipation(
+        observer,
+        PhaseFilter(PreviewMemory.make(ahead, stride), spread),
+        tuple(reader(signals, channel) for channel in names),
+        reader(signals, ["torque_reference"]) if gait else None,
+        reader(signals, ["pressure"]),
+        RegulatorBank.make(plant, adaptive),
+        spec.knob("swing") * SWING,
+        adaptive,
+        spec.actions["pressure_set_point"],
+    )
+
+
+ANTICIPATION = partial(
+    Entry,
+    knowledge="nominal model",
+    preview=True,
+    citation="yeh2010; bertsekas2017; thrun2005",
+    envs=KNEE,
+    plants=(KneeOrthosis,),
+    knobs=KNOBS,
+)
+ENTRIES = {
+    "knee_anticipating": ANTICIPATION(
+        "inverse along the best rate-limited path to the previewed stride, one dead time ahead",
+        make=make_knee_anticipation,
+    ),
+    "knee_anticipating_adaptive": ANTICIPATION(
+        "knee_anticipating, its regulator and gain estimated from sensed pressure and tension",
+        make=partial(make_knee_anticipation, adaptive=True),
+        feedback=True,
+        citation="yeh2010; bertsekas2017; thrun2005; magill1965",
+    ),
+}

@@ -1,0 +1,1 @@
+"""Predictive controllers: optimisation over a preview horizon."""

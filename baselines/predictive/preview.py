@@ -1,0 +1,89 @@
+"""Memory of previewed references.
+
+The environments preview a reference at a few times ahead. Every sample is kept, so that a horizon
+ahead of the present the reference is known at every control period. Beyond it the last sample is
+extended, or, of a periodic reference, the period before is repeated.
+
+Times are in control periods from the start of the episode.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.core.controller import Rows
+from pam_envs.arrays import Array
+
+
+class Preview(NamedTuple):
+    """Samples, shape (n_env, n_channels, size), a ring over time; present time, (n_env,)."""
+
+    samples: Array
+    step: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class PreviewMemory:
+    """Memory of previewed samples.
+
+    Attributes
+    ----------
+    ahead : ndarray of int, shape (n_samples,)
+        Times of the previewed samples from the present, the present one first.
+    stride : float
+        Period of the reference; infinite if it has none.
+    size : int
+        Samples that are kept.
+    """
+
+    ahead: NDArray[np.int64]
+    stride: float
+    size: int
+
+    @classmethod
+    def make(cls, ahead: NDArray[np.int64], stride: float = math.inf) -> "PreviewMemory":
+        """Return the memory for preview times and a period [control periods]."""
+        kept = stride if math.isfinite(stride) else 0.0
+        return cls(ahead, stride, math.ceil(kept) + 2 * int(ahead[-1]) + 8)
+
+    def start(self, samples: Array) -> Preview:
+        """Return the memory before :meth:`add` of first samples, (n_env, n_channels, n_samples)."""
+        n, channels, _ = samples.shape
+        filled = np.zeros((n, channels, self.size))
+        dense = np.arange(self.ahead[-1] + 1)
+        for row in range(n):
+            for channel in range(channels):
+                line = np.interp(dense, self.ahead, samples[row, channel])
+                filled[row, channel, : len(dense)] = line
+        return Preview(filled, np.full(n, -1))
+
+    def add(self, seen: Preview, samples: Array) -> Preview:
+        """Return the memory one period later, with its previewed samples.
+
+        The present sample is left out: it may differ from what was planned.
+        """
+        kept, step = seen.samples.copy(), seen.step + 1
+        at = (step[:, None] + self.ahead[1:]) % self.size
+        rows, channels = np.arange(len(kept))[:, None, None], np.arange(kept.shape[1])[:, None]
+        kept[rows, channels, at[:, None]] = samples[:, :, 1:]
+        return Preview(kept, step)
+
+    def read(self, seen: Preview, times: Array) -> tuple[Array, Rows]:
+        """Return samples at times, (n_env, n_times), and where it is known.
+
+        The samples have the shape (n_env, n_channels, n_times).
+        """
+        last = (seen.step + self.ahead[-1])[:, None]
+        strides = np.ceil(np.maximum(times - last, 0.0) / self.stride)
+        before = times - strides * self.stride if math.isfinite(self.stride) else times
+        known = (before >= 0.0) & (before <= last)
+        held = np.clip(np.where(before >= 0.0, before, last), 0.0, last)
+        whole = np.minimum(held.astype(np.int64), np.maximum(last - 1, 0))
+        part = (held - whole)[:, None]
+        rows, channels = np.arange(len(held))[:, None, None], np.arange(seen.samples.shape[1])
+        low = seen.samples[rows, channels[:, None], (whole % self.size)[:, None]]
+        high = seen.samples[rows, channels[:, None], ((whole + 1) % self.size)[:, None]]
+        return (1.0 - part) * low + part * high, known

@@ -1,0 +1,1 @@
+"""Bounds on the error that any controller can reach in a track."""
