@@ -401,6 +401,8 @@ SHOWN = Rig(
     max_pressure=6e5,
     contraction_noise=3e-5,
     pressure_noise=800.0,
+    settled=True,
+    clock_tolerance=0.0,
     repeats=(("holds_a", "holds_b"),),
     valve_closed=("shut",),
     tolerance={"mass.load": 0.02},
@@ -430,6 +432,8 @@ def test_rig_file_is_converted_to_si(tmp_path):
         load="constant_force",
         cycles_since_rest=3,
         rezeroed=True,
+        settled=False,
+        clock_tolerance=None,
         repeats=(("holds_a", "holds_b"), ("1", "2")),
     )
     assert pickle.loads(pickle.dumps(rig)) == rig

@@ -22,6 +22,7 @@ FAR, FAR_LOG = 30.0, 6.0
 ALIKE = 0.9  # cosine above which two causes can only be separated by a further sensor
 SHORT = "The recording is too short to decide anything"
 """Beginning of the warning on a short recording."""
+ROUNDING = 1e-9  # size over the noise that is only rounding
 LEAST_SIZE = 1.0  # size over the noise that a testable cause must reach within its bounds
 LEAST_TESTABLE, LEAST_SHARE = 5, 0.5
 """Least number of testable causes, or least share of the requested ones, for a decision."""
@@ -195,11 +196,16 @@ def unseen_rivals(
     return [c for c in lacking if c.name not in small]
 
 
+def shown(size: float) -> str:
+    """Return a size over the noise in digits, 0 for rounding errors."""
+    return f"{size:.2g}" if size > ROUNDING else "0"
+
+
 def _too_small(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
     reach = dict(zip(found.names, found.reach, strict=True))
     return {
         cause.name: (
-            f"within its bounds it shows at most {reach.get(cause.name, 0.0):.2g} times the noise "
+            f"within its bounds it shows at most {shown(reach.get(cause.name, 0.0))} times the noise "
             "of this recording after a refit of the plant"
         )
         for cause in causes

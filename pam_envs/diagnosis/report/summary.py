@@ -198,7 +198,7 @@ def sentence(report: Report, rule: Rule) -> str:
         )
     if verdict == "unexplained":
         return _unexplained(report, rule)
-    unseen = [r["title"] for r in report["rivals"] if r["why"] == "not excluded" and r["unseen"]]
+    unseen = [r["title"] for r in report["rivals"] if r["why"] == "not excluded" and r.get("unseen")]
     names = enumeration(_titles(report))
     if unseen:
         names += f", or {enumeration(unseen)}, which this recording cannot test"
@@ -216,13 +216,13 @@ def sentence(report: Report, rule: Rule) -> str:
 def _share_text(report: Report) -> str:
     """Return the explained share of the error, and what the rest depends on."""
     text = ""
-    for channel, e in (report["explained"] or {}).items():
+    for channel, e in (report.get("explained") or {}).items():
         if e["share"] is None or e["before"] <= FAR * e["floor"]:
             continue
         text += f" This explains {100 * max(e['share'], 0.0):.0f} % of the error of the {channel}"
         text += f" above the noise ({e['before']:.3g} to {e['after']:.3g} {e['unit']}"
         text += f", black box {e['black_box']:.3g})."
-    if report["incomplete"]:
+    if report.get("incomplete"):
         rest = {n for e in report["explained"].values() for n in e["depends_on"]}
         text += " The cause is incomplete: an error far above noise and black box remains"
         words = enumeration([n.replace("_", " ") for n in sorted(rest)])

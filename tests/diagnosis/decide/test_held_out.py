@@ -119,7 +119,7 @@ def test_reasons_of_rivals_match_the_decision():
     ]
     evidence = {"levels": [{"rivals": []}, {"rivals": rows}]}
     rivals = [best, close, like, weak, worse]
-    found = reasons(Decision("ambiguous", best, rivals, [close], evidence), Rule())
+    found = reasons(Decision("ambiguous", best, rivals, [close], evidence, 1), Rule())
     assert found == ["the best", "not excluded", "imitates it", "gains less", "surely worse"]
     assert [word in EXCLUDED for word in found] == [False, False, False, True, True]
 

@@ -14,7 +14,7 @@ CAUSE = Cause(
     signature=(
         "the error of one additional weight, equal at every load; segments without a load fit"
     ),
-    neighbours=("load_dependent_compliance",),
+    neighbours=("load_dependent_compliance", "static_law"),
     experiment=(
         "The same slow triangle under five loads, one of them none: a tray adds one weight to all "
         "loads but not to the empty hook, compliance grows with the load. Or weigh the load."

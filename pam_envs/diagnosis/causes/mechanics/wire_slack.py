@@ -11,7 +11,7 @@ CAUSE = Cause(
     title="the slack of the wire",
     forms=(Form("unilateral", (Term("mass.slack", (2e-4, 5e-4, 1.2e-3), scale=1e-4),)),),
     signature="a steep rise, then a pause until the load is lifted, longer under larger loads",
-    neighbours=("threshold_pressure", "load_dependent_compliance"),
+    neighbours=("threshold_pressure", "load_dependent_compliance", "static_law"),
     experiment=(
         "Slow ramps from rest under no load and two others, and once with a tight wire: only "
         "slack disappears; a threshold is also present without a load."

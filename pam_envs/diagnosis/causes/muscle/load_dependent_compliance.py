@@ -25,7 +25,13 @@ CAUSE = Cause(
         "a smooth function of pressure that differs between loads, independent of direction and "
         "time; with the base refitted, of opposite signs at the middle load and at the outer ones"
     ),
-    neighbours=("payload_error", "load_dependent_hysteresis", "wire_slack", "temperature"),
+    neighbours=(
+        "payload_error",
+        "load_dependent_hysteresis",
+        "wire_slack",
+        "temperature",
+        "static_law",
+    ),
     experiment=(
         "The same slow triangle under five loads, one of them none: a wrong load shifts all loads "
         "by one amount, slack ends at a certain contraction, the effect of compliance is "

@@ -14,7 +14,7 @@ CAUSE = Cause(
     forms=(
         Form(
             "map",
-            tuple(Term(f"muscle.{name}", (0.0,), scale=2.0, prior=10.0) for name in MAP_SIZES),
+            tuple(Term(f"muscle.{name}", (0.5,), scale=2.0, prior=10.0) for name in MAP_SIZES),
         ),
     ),
     signature="a smooth function of pressure and contraction, independent of direction and time",

@@ -12,7 +12,7 @@ CAUSE = Cause(
     title="the threshold pressure of the muscle",
     forms=(Form("hard", (Term("hysteresis.threshold", (5e3,), scale=2e3),)),),
     signature="the contraction starts late, with a kink, at the same pressure under every load",
-    neighbours=("sensor_bias", "wire_slack", "valve_dead_band"),
+    neighbours=("sensor_bias", "wire_slack", "valve_dead_band", "static_law"),
     experiment=(
         "Slow ramps from rest, against the measured pressure and under several loads: slack "
         "changes with the load, a dead band is not in the pressure, a threshold is constant."

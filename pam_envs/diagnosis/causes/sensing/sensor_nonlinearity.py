@@ -15,7 +15,7 @@ CAUSE = Cause(
         Form("pressure", (Term("pressure.bow", (0.01, -0.01), scale=0.01),)),
     ),
     signature="a smooth function of the reading alone, whatever load, direction, rate and time",
-    neighbours=("sensor_bias", "sensor_drift"),
+    neighbours=("sensor_bias", "sensor_drift", "static_law"),
     experiment=(
         "Measure the same staircase against a second sensor or gauge blocks: only this "
         "separates a nonlinear position reading from the muscle's own curve. A nonlinear pressure "
