@@ -7,7 +7,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from benchmarks.diagnosis.cases import NOISE, Case, Made, recording_of, sheet_of
+from benchmarks.diagnosis.cases import NOISE, Case, Made, recording_of
+from benchmarks.diagnosis.sources import sheet_of
 from pam_envs.arrays import Array
 from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.recording import Recording

@@ -88,7 +88,7 @@ def resonator_step(
     span = max(h, 1e-9)
     y, rate = rows[state][j], rows[state + 1][j]
     moved, rate = damped_motion(
-        rate, k * (was - y) - d * rate, k * (now - was) / span, k, d, decay(0.5 * d * span), span
+        rate, k * (was - y), k * (now - was) / span, k, d, decay(0.5 * d * span), span
     )
     rows[state][j], rows[state + 1][j] = y + moved, rate
     return y + moved, rate

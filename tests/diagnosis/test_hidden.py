@@ -56,8 +56,9 @@ def _imports(tree: ast.AST) -> set[str]:
     return names
 
 
-def test_hidden_rigs_import_only_numpy_and_numba():
-    files = sorted(FOLDER.rglob("*.py"))
+@pytest.mark.parametrize("folder", [FOLDER, FOLDER.with_name("worlds")], ids=lambda f: f.name)
+def test_hidden_rigs_import_only_numpy_and_numba(folder):
+    files = sorted(folder.rglob("*.py"))
     assert len(files) > 10
     for file in files:
         tree = ast.parse(file.read_text(encoding="utf-8"))

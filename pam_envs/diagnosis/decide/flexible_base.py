@@ -84,11 +84,10 @@ class FlexibleBase:
         known = {f.name for f in self.base.fit.frees}
         made = []
         for cause in causes:
-            form = cause.forms[0]
-            if any(self.rate is f for f in cause.forms):
-                form = self.rate
-            elif cause.in_valve:
+            rate = next((form for form in cause.forms if form is self.rate), None)
+            if cause.in_valve and rate is None:
                 continue
+            form = rate or cause.forms[0]
             if not any(t.name in known for t in form.terms):
                 made.append((cause, form))
         return made

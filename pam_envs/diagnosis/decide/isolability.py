@@ -205,8 +205,8 @@ def _too_small(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
     reach = dict(zip(found.names, found.reach, strict=True))
     return {
         cause.name: (
-            f"within its bounds it shows at most {shown(reach.get(cause.name, 0.0))} times the noise "
-            "of this recording after a refit of the plant"
+            f"within its bounds it shows at most {shown(reach.get(cause.name, 0.0))} times the "
+            "noise of this recording after a refit of the plant"
         )
         for cause in causes
         # the time of an event is searched in the residual

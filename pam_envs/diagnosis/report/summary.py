@@ -198,7 +198,8 @@ def sentence(report: Report, rule: Rule) -> str:
         )
     if verdict == "unexplained":
         return _unexplained(report, rule)
-    unseen = [r["title"] for r in report["rivals"] if r["why"] == "not excluded" and r.get("unseen")]
+    doubtful = [r for r in report["rivals"] if r["why"] == "not excluded"]
+    unseen = [rival["title"] for rival in doubtful if rival.get("unseen")]
     names = enumeration(_titles(report))
     if unseen:
         names += f", or {enumeration(unseen)}, which this recording cannot test"
