@@ -44,6 +44,10 @@ class Form:
     # (pam_envs.diagnosis.fit.starting_values)
     search: Callable[..., Sequence[Sequence[float]]] | None = None
 
+    def start(self, k: int) -> list[float]:
+        """Return the ``k``-th starting value of each term, the last one of those with fewer."""
+        return [t.starts[min(k, len(t.starts) - 1)] for t in self.terms]
+
     @property
     def trials(self) -> int:
         """Number of starting points among which the best is selected."""

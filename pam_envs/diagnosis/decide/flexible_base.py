@@ -100,7 +100,7 @@ class FlexibleBase:
             begins.append(
                 np.array([inside(f, self.guess.get(f.name, f.start)) for f in plain.frees])
             )
-        for (_, begin), k in product(enumerate(begins), range(STARTS)):
+        for begin, k in product(begins, range(STARTS)):
             frees = tuple(
                 free
                 for _, form in causes
@@ -108,8 +108,8 @@ class FlexibleBase:
                     self.family,
                     form,
                     [
-                        self.guess.get(t.name, t.starts[min(k, len(t.starts) - 1)])
-                        for t in form.terms
+                        self.guess.get(t.name, start)
+                        for t, start in zip(form.terms, form.start(k), strict=True)
                     ],
                 )
             )

@@ -119,7 +119,7 @@ def regulator(
     for form in rates:
         if not flows and not any(t.name in known for t in form.terms):
             limits += [
-                frees_for(family, form, [t.starts[min(k, len(t.starts) - 1)] for t in form.terms])
+                frees_for(family, form, form.start(k))
                 for k in range(max(len(t.starts) for t in form.terms))
             ]
     fits = [Fit.at_start((*order, *limit), family.column) for order in orders for limit in limits]

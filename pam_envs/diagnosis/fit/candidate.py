@@ -50,7 +50,7 @@ def starting_points(
             base.begins[key] = [tuple(s) for s in form.search(problem, family, base, form)]
         return list(base.begins[key])
     n = max(len(t.starts) for t in form.terms)
-    return [tuple(t.starts[min(i, len(t.starts) - 1)] for t in form.terms) for i in range(n)]
+    return [tuple(form.start(i)) for i in range(n)]
 
 
 def initial_fits(
