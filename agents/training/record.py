@@ -11,6 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import agents
+import baselines
+import pam_envs
 from agents.policies.policy_file import POLICY, finished
 from agents.settings import presets as configs
 from agents.settings import seeds
@@ -19,8 +22,7 @@ from agents.settings.schema import SettingsError
 from sweeps.files import sources_digest
 from sweeps.versions import versions_of
 
-ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ("agents", "baselines", "pam_envs")
+SOURCES = tuple(Path(package.__path__[0]) for package in (agents, baselines, pam_envs))
 PACKAGES = (
     *("numpy", "scipy", "numba", "gymnasium"),
     *("torch", "stable_baselines3", "sb3_contrib", "onnx"),
@@ -88,7 +90,7 @@ class Run:
 @cache
 def code() -> str:
     """Return a digest of the Python files that a training runs, as first read by this process."""
-    return sources_digest([ROOT / name for name in SOURCES], {".py"})
+    return sources_digest(SOURCES, {".py"})
 
 
 @dataclass

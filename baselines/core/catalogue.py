@@ -126,8 +126,9 @@ def _register_entries(module: Any) -> list[str]:
 
 
 def _collect() -> None:
-    for found in pkgutil.walk_packages(baselines.__path__, "baselines."):
-        if not found.name.startswith("baselines.core"):
+    package = baselines.__name__
+    for found in pkgutil.walk_packages(baselines.__path__, f"{package}."):
+        if not found.name.startswith(f"{package}.core"):
             _register_entries(importlib.import_module(found.name))
     CONTROLLERS.update(tuned.entries(PUBLISHED, tuned.read()))
     for folder in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):

@@ -1,0 +1,54 @@
+"""Build of the wheel: the folders of the checkout become parts of the package ``pam_envs``.
+
+``baselines``, ``agents`` and ``sweeps`` are names that other distributions use, too. The wheel
+holds them as ``pam_envs.baselines`` and so on, with their imports renamed. Pretrained policies
+are not included.
+"""
+
+import re
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+PACKAGE = "pam_envs"
+FOLDERS = ("baselines", "agents", "sweeps")
+SUFFIXES = (".py", ".yaml", ".json")
+LEFT_OUT = ("pretrained",)
+NAMES = "|".join(FOLDERS)
+FROM = re.compile(rf"^(\s*from )({NAMES})(?=[.\s])", re.MULTILINE)
+IMPORT = re.compile(rf"^(\s*)import ({NAMES})$", re.MULTILINE)
+
+
+def renamed(source: str) -> str:
+    """Return Python source whose imports of the folders name them as parts of the package."""
+    return IMPORT.sub(rf"\1from {PACKAGE} import \2", FROM.sub(rf"\1{PACKAGE}.\2", source))
+
+
+class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]
+    """Copy the folders with renamed imports into the wheel."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Add the renamed files; an editable install imports the folders as they are."""
+        if version == "editable":
+            return
+        self.copies = Path(tempfile.mkdtemp())
+        root = Path(self.root)
+        for folder in FOLDERS:
+            for file in sorted((root / folder).rglob("*")):
+                place = file.relative_to(root)
+                if file.suffix not in SUFFIXES or set(place.parts) & set(LEFT_OUT):
+                    continue
+                copy = self.copies / place
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                text = file.read_text(encoding="utf-8")
+                made = renamed(text) if file.suffix == ".py" else text
+                copy.write_text(made, encoding="utf-8")
+                build_data["force_include"][str(copy)] = f"{PACKAGE}/{place.as_posix()}"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Remove the copies."""
+        if version != "editable":
+            shutil.rmtree(self.copies)

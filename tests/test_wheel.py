@@ -1,0 +1,102 @@
+"""The wheel is complete and small, and the README's snippets run from it."""
+
+import ast
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = {"baselines", "agents", "sweeps"}
+RUN_README = """
+import re, sys
+wheel, page = sys.argv[1:]
+sys.path.insert(0, wheel)
+names = {"__name__": "readme"}
+for snippet in re.findall(r"^```python\\n(.*?)^```$", open(page).read(), re.M | re.S):
+    exec(snippet, names)
+import pam_envs
+assert pam_envs.__file__.startswith(wheel), pam_envs.__file__
+assert "pam_envs.baselines.core.catalogue" in sys.modules
+assert not {"baselines", "agents", "sweeps"} & set(sys.modules)
+print("rms", names["rms"])
+"""
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    builders = pytest.importorskip("hatchling.builders.wheel")
+    folder = tmp_path_factory.mktemp("wheel")
+    (made,) = builders.WheelBuilder(str(ROOT)).build(directory=str(folder), versions=["standard"])
+    return Path(made)
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("installed")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def run(installed: Path, *arguments: str, where: Path) -> str:
+    made = subprocess.run(
+        [sys.executable, "-P", *arguments],
+        cwd=where,
+        env={**os.environ, "PYTHONPATH": str(installed)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert made.returncode == 0, made.stderr
+    return made.stdout
+
+
+def test_wheel_has_one_package_and_at_most_2_MB(wheel):
+    objects = sum(file.stat().st_size for file in ROOT.glob("pam_envs/kernels/objects/*"))
+    assert wheel.stat().st_size - objects <= 2_000_000
+    with zipfile.ZipFile(wheel) as archive:
+        tops = {name.partition("/")[0] for name in archive.namelist()}
+    assert tops == {"pam_envs", "pam_envs-0.1.0.dist-info"}
+
+
+def test_wheel_has_every_module_and_settings_file(installed):
+    for folder in FOLDERS:
+        for file in (ROOT / folder).rglob("*"):
+            if file.suffix in (".py", ".yaml"):
+                assert (installed / "pam_envs" / file.relative_to(ROOT)).is_file(), file
+
+
+def test_modules_of_the_wheel_import_no_name_of_the_checkout(installed):
+    for file in installed.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and not node.level:
+                names = [node.module or ""]
+            assert not {name.partition(".")[0] for name in names} & FOLDERS, file
+
+
+def test_snippets_of_the_readme_run_from_the_wheel(installed, tmp_path):
+    page = str(ROOT / "README.md")
+    said = run(installed, "-W", "error", "-c", RUN_README, str(installed), page, where=tmp_path)
+    assert 0.0 < float(said.rpartition("rms")[2]) < 0.5e-3  # m
+
+
+def test_agents_run_from_the_wheel(installed, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    said = run(installed, "-m", "pam_envs.agents", "presets", where=tmp_path)
+    assert "PAM/KneeWalk-v0  ppo  " in said
+
+
+def test_names_of_the_wheel_are_the_same_modules_in_the_checkout():
+    from pam_envs.baselines.core import catalogue
+
+    import baselines.core.catalogue as own
+
+    assert catalogue is own
+    assert catalogue.__spec__.name == "baselines.core.catalogue"
+    with pytest.raises(ModuleNotFoundError, match=r"pam_envs\.baselines\.nothing"):
+        __import__("pam_envs.baselines.nothing")
