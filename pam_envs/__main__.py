@@ -1,4 +1,4 @@
-"""Command line of ``pam-envs``: list, render, identify, diagnose, export, warmup."""
+"""Command line of ``pam-envs``: list, render, identify, diagnose, export, warmup, doctor."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import itertools
 import os
 import re
 import sys
+import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,17 +18,22 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
+from pam_envs.doctor import doctor
 from pam_envs.envs.registration import full_id, register_all
 from pam_envs.envs.rendering.renderer import write_film
 from pam_envs.envs.rendering.scene import view_of
 from pam_envs.export import command as exporting
 from pam_envs.hysteresis.protocol import kinds
 from pam_envs.parameters import Signals
+from pam_envs.wording import package
 
 if TYPE_CHECKING:
     Kind: TypeAlias = str
 else:
     Kind = Literal[kinds()]  # the registered models
+
+WIDTH = 80
+"""Columns of the list of environments."""
 
 
 def env_ids() -> list[str]:
@@ -50,21 +56,24 @@ def env_id(given: str) -> str:
 
 
 def list_environments() -> None:
-    """List the registered environments."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title="Environments")
-    table.add_column("id", no_wrap=True)
-    for column in ("action", "observation", "control period", "hysteresis models"):
-        table.add_column(column, overflow="fold")
+    """List the registered environments with their signals."""
     for name in env_ids():
         env: Any = gym.make(name).unwrapped
-        actions, signals = _names(env.action_signals), _names(env.signals)
-        period = f"{1e3 * env.control_period:g} ms"
-        table.add_row(name, actions, signals, period, ", ".join(kinds()))
+        print(f"{name:{WIDTH - 24}}{1e3 * env.control_period:>6g} ms control period")
+        for word, signals in (("action", env.action_signals), ("observation", env.signals)):
+            indent = f"  {word:13}"
+            print(
+                textwrap.fill(
+                    _names(signals),
+                    WIDTH,
+                    initial_indent=indent,
+                    subsequent_indent=" " * len(indent),
+                    break_long_words=False,
+                    break_on_hyphens=False,
+                )
+            )
         env.close()
-    Console().print(table)
+    print(f"hysteresis models: {', '.join(kinds())}")
 
 
 def _names(signals: Signals) -> str:
@@ -309,18 +318,23 @@ def main(arguments: list[str] | None = None) -> int:
         "diagnose": diagnose,
         "export": export,
         "warmup": warmup,
+        "doctor": doctor,
     }
+    if (sys.argv[1:] if arguments is None else arguments) == ["--version"]:
+        print(package())
+        return 0
     try:
-        tyro.extras.subcommand_cli_from_dict(
+        status = tyro.extras.subcommand_cli_from_dict(
             commands,
             args=arguments,
             prog="pam-envs",
-            description="Environments for the control of pneumatic artificial muscles.",
+            description="Environments for the control of pneumatic artificial muscles. "
+            "--version prints the version.",
         )
     except (ValueError, OSError, ImportError, RuntimeError) as error:
         print(f"pam-envs: {error}", file=sys.stderr)
         return 2
-    return 0
+    return int(status or 0)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ provenance and source. :func:`check` refuses a value out of bounds.
 import dataclasses
 import math
 from collections import namedtuple
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache, partial
 from itertools import accumulate
 from typing import Any, Literal
@@ -37,7 +37,7 @@ class Declaration:
     neutral : float or None
         The value that switches the effect off, where there is one.
     spread : tuple of float or None
-        Range over which domain randomisation draws an assumed parameter, in ``unit``.
+        Range over which domain randomization draws an assumed parameter, in ``unit``.
     """
 
     unit: str
@@ -219,3 +219,21 @@ class Signals(tuple[Signal, ...]):
         """Return the SI value of the signal ``name`` from vectors of shape (..., n)."""
         found: Signal = self[name]
         return found.decode(vector)
+
+    def encode(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float32]:
+        """Return vectors, shape (..., n), from the SI values of every signal by name.
+
+        Values are clipped to the ranges of their signals; their shapes (...) are broadcast.
+
+        Raises
+        ------
+        ValueError
+            If a signal has no value, or a value no signal.
+        """
+        names = list(self.names())
+        missing, unknown = [n for n in names if n not in values], sorted({*values} - {*names})
+        if missing or unknown:
+            wrong = f"no value of {missing[0]}" if missing else f"no signal named {unknown[0]!r}"
+            raise ValueError(f"{wrong}; give SI values of exactly: {', '.join(names)}")
+        entries = np.broadcast_arrays(*(self[n].encode(values[n]) for n in names))
+        return np.stack(entries, axis=-1).astype(np.float32)

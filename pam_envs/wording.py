@@ -11,7 +11,9 @@ def near(word: str, known: Iterable[str], otherwise: str = "") -> str:
     close = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
     if close:
         return f"; did you mean {close[0]!r}?"
-    return otherwise or f"; known: {', '.join(choices)}"
+    if otherwise:
+        return otherwise
+    return f"; known: {', '.join(choices)}" if choices else "; there are none"
 
 
 def package() -> str:

@@ -1,20 +1,70 @@
 """The command line from the user's side."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import pam_envs
+from pam_envs import doctor
 from pam_envs.__main__ import env_id, env_ids, main
+from pam_envs.kernels.build import COMPILED
 
 
-def test_list_shows_every_environment(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "200")
+def test_list_shows_every_environment_in_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list"]) == 0
     out = capsys.readouterr().out
-    assert "PAM/MusclePositioning-v0" in out
+    assert all(name in out for name in env_ids())
     assert "pressure_set_point (Pa)" in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"pam-envs {pam_envs.__version__}\n"
+
+
+def test_doctor_reports_a_sound_installation(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    topics = {line[7:21].strip() for line in out.splitlines()[:-1]}
+    assert {"package", "versions", "extra", "compiler", "cache", "first step", "GPU"} <= topics
+    assert f"numpy {np.__version__}" in out
+    assert out.endswith("no faults\n")
+
+
+def test_doctor_names_the_remedy_of_a_cache_that_cannot_be_written(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setattr("pam_envs.kernels.cache.FOLDER", tmp_path / "file" / "cache")
+    monkeypatch.setattr(doctor, "CHECKS", (doctor.versions, doctor.stored))
+    assert main(["doctor"]) == 1
+    printed = capsys.readouterr()
+    assert "FAULT  cache" in printed.out
+    assert "set PAM_ENVS_CACHE to a folder that can be written" in printed.out
+    assert printed.err == "1 faults\n"
+
+
+@pytest.mark.skipif(not COMPILED, reason="there is no machine code")
+def test_doctor_compares_machine_code_with_plain_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {finding.topic: finding for finding in doctor.first_step()}
+    assert found["machine code"].ok
+    other = iter((np.zeros(3), np.ones(3)))
+    monkeypatch.setattr(doctor, "_episode", lambda env: next(other))
+    found = {finding.topic: finding for finding in doctor.first_step()}
+    assert not found["machine code"].ok
+    assert "differs from plain Python; delete" in found["machine code"].text
+
+
+def test_doctor_reports_a_check_that_raises(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken() -> Iterator[doctor.Finding]:
+        raise OSError("no room")
+        yield
+
+    monkeypatch.setattr(doctor, "CHECKS", (broken,))
+    assert list(doctor.examine()) == [doctor.Finding("broken", "OSError: no room", ok=False)]
 
 
 @pytest.mark.parametrize(

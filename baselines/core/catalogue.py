@@ -2,13 +2,13 @@
 
 Each module of this package that defines controllers holds their entries in ``ENTRIES``, a dict of
 :class:`~baselines.core.entry.Entry` by name; the catalogue collects them. Third-party controllers
-are added by :func:`register`, by :func:`load` from a folder of such modules, or by folders in the
-environment variable ``PAM_ENVS_CONTROLLERS`` (separated as in ``PATH``), which command lines read
-as well.
+are added by :func:`register`, by :func:`load` from a folder of such modules, by folders in the
+environment variable ``PAM_ENVS_CONTROLLERS`` (separated as in ``PATH``), or by modules of other
+distributions (:mod:`pam_envs.entry_points`); command lines read the last two as well.
 
 A controller is built from a nominal plant and the named signals, never from an environment. Its
 model knowledge is part of its result. For "nominal model" the caller provides the model: if that is
-the simulated plant itself without randomisation, the controller knows the true model, and a table
+the simulated plant itself without randomization, the controller knows the true model, and a table
 of results should report it.
 
 Numbers that neither a rule nor a paper fixes are *knobs* (:mod:`baselines.core.entry`). Names with
@@ -27,6 +27,7 @@ import baselines
 from baselines.core import tuned
 from baselines.core.controller import Controller
 from baselines.core.entry import AS_DESIGNED, Entry, Knobs, Spec, check_knobs
+from pam_envs import entry_points
 from pam_envs.parameters import Signals
 from pam_envs.wording import near
 
@@ -131,6 +132,7 @@ def _collect() -> None:
         if not found.name.startswith(f"{package}.core"):
             _register_entries(importlib.import_module(found.name))
     CONTROLLERS.update(tuned.entries(PUBLISHED, tuned.read()))
+    entry_points.each(entry_points.CONTROLLERS, lambda found: _register_entries(found.load()))
     for folder in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
         load(folder)
 

@@ -7,6 +7,8 @@ from types import ModuleType
 
 import gymnasium as gym
 
+from pam_envs.entry_points import ENVIRONMENTS, each
+
 NAMESPACE = "PAM/"
 FAMILIES = "PAM_ENVS_FAMILIES"
 """Environment variable with the import names of further families, separated by commas."""
@@ -37,11 +39,15 @@ def register_family(family: ModuleType | str) -> tuple[str, ...]:
 
 
 def register_all() -> None:
-    """Register every family: each folder beside this module, and those of ``FAMILIES``."""
+    """Register every family.
+
+    These are the folders beside this module, those of entry points, and those of ``FAMILIES``.
+    """
     package = importlib.import_module(__name__.rpartition(".")[0])
     for found in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
         if found.ispkg and hasattr(importlib.import_module(found.name), "ENVIRONMENTS"):
             register_family(found.name)
+    each(ENVIRONMENTS, lambda found: register_family(found.module))
     for name in filter(None, os.environ.get(FAMILIES, "").split(",")):
         register_family(name)
 

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.entry_points import muscle
 from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, check_whole
 from pam_envs.envs.core.step import MOST_PREVIEW
@@ -38,7 +39,7 @@ def inert_of(plant: Any) -> frozenset[str]:
 
 
 @dataclass(frozen=True)
-class Randomisation:
+class Randomization:
     """Parameters of a family that ``randomize`` may draw."""
 
     parameters: Sequence[str]
@@ -66,8 +67,9 @@ class Common:
     air : {"regulator", "flow"}, optional
         Air of the muscles: behind closed-loop regulators, or flowing through their orifices into
         the muscles' volumes (ISO 6358). Default: that of ``plant``, or "regulator".
-    plant : plant or path, optional
-        Plant of the environment's family, as an object or a YAML file. Default: the published one.
+    plant : plant, path or str, optional
+        Plant of the environment's family, as an object, a YAML file, or the name of an entry point
+        (:mod:`pam_envs.entry_points`). Default: the published one.
     reference : str or array_like
         Family of references, or samples, one per control period (the last one holds).
     preview : int
@@ -130,11 +132,13 @@ class Common:
             check_choice("hysteresis", hysteresis, kinds())
         if plant is None:
             return default(kind_of(hysteresis or "maxwell_slip", drive, usual))
-        made: Any = kind.from_yaml(plant) if isinstance(plant, (str, Path)) else plant  # type: ignore[attr-defined]
+        made: Any = muscle(plant) if isinstance(plant, str) else plant
+        if made is None or isinstance(made, Path):
+            made = kind.from_yaml(plant)  # type: ignore[attr-defined]
         if not isinstance(made, kind):
             raise ValueError(
-                f"plant must be a {kind.__name__}, the path of a plant file, or None, not a "
-                f"{type(plant).__name__}"
+                f"plant must be a {kind.__name__}, the path of a plant file, the name of an entry "
+                f"point, or None, not a {type(made).__name__}"
             )
         own = made.hysteresis.choice  # type: ignore[attr-defined]
         if hysteresis is not None and model_of(hysteresis).identity:
@@ -208,7 +212,7 @@ class Common:
         check(task, "reward")
         return task  # type: ignore[no-any-return]
 
-    def drawn(self, plant: Any, which: Randomisation) -> tuple[Any, NDArray[np.float64]]:
+    def drawn(self, plant: Any, which: Randomization) -> tuple[Any, NDArray[np.float64]]:
         """Return the plant and the ranges that every episode draws (:meth:`spread_of`).
 
         Enclosed air stiffens a muscle: with ``air="flow"`` the plant has as many sub-steps as the
@@ -222,7 +226,7 @@ class Common:
                     raise
             plant = dataclasses.replace(plant, substeps=plant.substeps + 1)
 
-    def spread_of(self, plant: Any, which: Randomisation) -> NDArray[np.float64]:
+    def spread_of(self, plant: Any, which: Randomization) -> NDArray[np.float64]:
         """Return (row, low, high) of each parameter that every episode draws, checked."""
         names, ranges, table = list(which.parameters), self._ranges(plant, which), []
         inert = inert_of(plant)
@@ -258,7 +262,7 @@ class Common:
             member.replace(worst)  # refuses a corner that the sub-steps cannot follow
         return np.array(table, float).reshape(-1, 3)
 
-    def _ranges(self, plant: Any, which: Randomisation) -> dict[str, Any]:
+    def _ranges(self, plant: Any, which: Randomization) -> dict[str, Any]:
         """Return the range of each parameter that ``randomize`` asks for."""
         randomize = self.randomize
         if randomize is False:

@@ -91,7 +91,8 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], Info]:
-        """Start an episode; see Gymnasium."""
+        """Start an episode; see Gymnasium. There are no ``options``."""
+        self._check_options(options)
         a, b, episode = self.setup.seed_rows
         if seed is not None or self._seed is None:
             self._seed = fresh_seed() if seed is None else check_seed(seed)

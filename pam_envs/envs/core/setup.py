@@ -1,5 +1,6 @@
 """Configuration of an environment: checked, laid out as arrays for the kernels, and given to it."""
 
+import copy
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,6 +8,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from pam_envs.envs.core.step import CHOICE, EPISODE, N_SEED
@@ -44,6 +46,11 @@ class Setup:
     def info_keys(self) -> tuple[str, ...]:
         """Keys of ``info``, in the order in which the kernels write them."""
         return self.kernels.report.keys  # type: ignore[no-any-return]
+
+    @property
+    def episode_steps(self) -> int:
+        """Control periods until an episode is truncated."""
+        return math.ceil(self.episode_seconds / self.control_period - 0.5)
 
     @property
     def seed_rows(self) -> tuple[int, int, int]:
@@ -269,6 +276,29 @@ class Configured:
     action_signals: Signals
     control_period: float
     render_mode: str | None
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Specification of the environment; ``max_episode_steps`` is the length of its episodes."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        if spec is not None and spec.max_episode_steps is None:
+            spec = copy.deepcopy(spec)
+            spec.max_episode_steps = self.setup.episode_steps
+        self._spec = spec
+
+    def _check_options(self, options: Mapping[str, Any] | None, known: Sequence[str] = ()) -> None:
+        """Refuse options of a reset that the environment does not have."""
+        for name in options or {}:
+            if name not in known:
+                there = f"the only option is {', '.join(known)}" if known else "there are none"
+                raise ValueError(
+                    f"reset(options={{{name!r}: ...}}): {there}; give {name} to gymnasium.make, "
+                    "or randomize=True for parameters that change between episodes"
+                )
 
     def _configure(self, setup: Setup | None, arguments: Mapping[str, Any]) -> Setup:
         """Set the attributes from a setup, or from that of the arguments."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pam_envs.envs.core.setup import (
     BEGIN,
+    STEP,
     STEP_AND_RESTART,
     Configured,
     Setup,
@@ -28,6 +29,7 @@ from pam_envs.kernels.random import seed_words
 
 PARALLEL_FROM = 4096
 """Rows from which on a batch is spread over the cores."""
+MODES = tuple(mode.value for mode in AutoresetMode)
 
 
 class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
@@ -46,6 +48,8 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         Whether steps return ``info``; learning needs none and is faster without.
     threads : int or None
         1: one core. None: all cores for batches of 4,096 rows and more.
+    autoreset_mode : AutoresetMode or str
+        Mode of automatic resets, or its value: "SameStep", "NextStep" or "Disabled".
     setup : Setup, optional
         Configuration; default: ``make_setup(**arguments)``.
     **arguments : object
@@ -63,6 +67,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         num_envs: int = 1,
         info: bool = True,
         threads: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         setup: Setup | None = None,
         **arguments: Any,
     ) -> None:
@@ -71,6 +76,9 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         check_choice("a batch's render_mode", setup.render_mode, (None, "rgb_array"))
         if setup.render_mode is not None and not info:
             raise ValueError("render_mode = 'rgb_array' needs info; leave info=True")
+        check_choice("autoreset_mode", str(getattr(autoreset_mode, "value", autoreset_mode)), MODES)
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.with_info = bool(info)
         self._renderers: list[Any] = []
         self.single_observation_space = space_of(setup.signals)
@@ -78,6 +86,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._seeded = False
+        self._ended = np.zeros(self.num_envs, np.bool_)
         self._last_observation = np.zeros((self.num_envs, len(setup.signals)), np.float32)
         self._all = tuple(for_kernels(a) for a in setup.state(tiles_for(num_envs), LANES))
         self._shared = tuple(for_kernels(a) for a in setup.shared)
@@ -92,6 +101,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start episodes; see Gymnasium. ``options["reset_mask"]`` resets some rows only."""
+        self._check_options(options, ("reset_mask",))
         mask = np.ones(self.num_envs, np.bool_)
         if options is not None and "reset_mask" in options:
             mask = np.asarray(options["reset_mask"])
@@ -108,6 +118,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         observations[0], infos[0], flags[0], flags[1] = self._last_observation, 0.0, mask, False
         self._call(np.zeros((self.num_envs, len(self.action_signals))), outputs, BEGIN)
         self._seeded = True
+        self._ended = self._ended & ~mask
         self._last_observation = observations[0].copy()
         if self.render_mode is not None:
             self._record(infos[0], np.flatnonzero(mask), mask)
@@ -179,18 +190,41 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         """
         if not self._seeded:
             raise gym.error.ResetNeeded("call reset() before step()")
+        before = self._ended
+        if before.any() and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise gym.error.ResetNeeded(
+                f"the episodes of rows {np.flatnonzero(before)[:8].tolist()} have ended; call "
+                "reset(options={'reset_mask': terminated | truncated}) before step()"
+            )
         actions = self._numbers(actions, (self.num_envs, len(self.action_signals)), "actions")
         outputs = self._outputs()
         observations, reports, flags = outputs
-        self._call(actions, outputs, STEP_AND_RESTART)
+        if self.autoreset_mode == AutoresetMode.SAME_STEP:
+            self._call(actions, outputs, STEP_AND_RESTART)
+            starts = flags[0] | flags[1]
+        else:
+            self._call(actions, outputs, STEP)
+            self._restart(before, outputs)
+            starts, self._ended = before, flags[0] | flags[1]
         self._last_observation = observations[0].copy()
         infos = self._infos(reports[0])
-        ended = flags[0] | flags[1]
         if self.render_mode is not None:
-            self._record(reports[0], np.arange(self.num_envs), ended)
-        if ended.any():
-            self._add_final(infos, ended, observations[1], reports[1])
+            self._record(reports[0], np.arange(self.num_envs), starts)
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and starts.any():
+            self._add_final(infos, starts, observations[1], reports[1])
         return observations[0], reports[0, 0], flags[0], flags[1], infos
+
+    def _restart(self, rows: NDArray[np.bool_], outputs: tuple[NDArray[Any], ...]) -> None:
+        """Start the next episode of some rows; write their first observation and reward 0."""
+        if not rows.any():
+            return
+        _, reports, flags = outputs
+        kept = flags & ~rows
+        flags[0], flags[1] = rows, False
+        self._seed_rows(None, rows)
+        self._call(np.zeros((self.num_envs, len(self.action_signals))), outputs, BEGIN)
+        reports[0, 0, rows] = 0.0
+        flags[...] = kept
 
     def _infos(self, info: NDArray[np.float64]) -> dict[str, Any]:
         return dict(zip(self.setup.info_keys, info[1:], strict=True)) if self.with_info else {}
@@ -245,6 +279,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
             **saved(self._all),
             "last": self._last_observation.copy(),
             "seeded": np.array(self._seeded),
+            "ended": self._ended.copy(),
         }
 
     def set_state(self, state: dict[str, NDArray[Any]]) -> None:
@@ -259,8 +294,9 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         try:
             last = np.array(state["last"], np.float32).reshape(self._last_observation.shape)
             seeded = bool(state["seeded"])
+            ended = np.array(state["ended"], np.bool_).reshape(self._ended.shape)
         except (KeyError, ValueError, TypeError) as error:
             raise ValueError(f"the state was not made by get_state: {error!r}") from error
         self._all = tuple(map(for_kernels, parts))
-        self._last_observation, self._seeded = last, seeded
+        self._last_observation, self._seeded, self._ended = last, seeded, ended
         self._renderers = []

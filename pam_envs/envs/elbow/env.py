@@ -50,7 +50,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
+from pam_envs.envs.core.arguments import Common, Randomization, environment_arguments, environments
 from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
 from pam_envs.envs.elbow import layout as L
 from pam_envs.envs.elbow.kernels import kernels_for
@@ -65,7 +65,7 @@ LEAST_RANGES, ROUND = (30.0, 15.0), 5.0
 """Smallest ranges of torque [N m] and stiffness [N m/rad], and the step of rounding."""
 MARGIN = math.radians(5.0)
 """Smallest distance [rad] of intended motions from the ends of the range."""
-RANDOMISATION = Randomisation(
+RANDOMISATION = Randomization(
     R.NAMES,
     (
         *("regulator.max_pressure", "valve.frequency", "pulley.radius", "pulley.lowest"),

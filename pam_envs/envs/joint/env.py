@@ -40,7 +40,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
+from pam_envs.envs.core.arguments import Common, Randomization, environment_arguments, environments
 from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose, masses_of
 from pam_envs.envs.joint import kernels as L
 from pam_envs.plants.antagonistic_joint import rows as R
@@ -55,7 +55,7 @@ MOST_PAYLOAD = 2.0
 """Largest payload [kg]."""
 USUAL_SHARE = 2.0 / 3.0
 """Share of the joint's limit that references and random starts reach."""
-RANDOMISATION = Randomisation(
+RANDOMISATION = Randomization(
     R.NAMES,
     ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
     "{'regulator.time_constant': (0.03, 0.06)}",

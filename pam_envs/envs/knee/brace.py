@@ -31,7 +31,7 @@ Arguments: :func:`make_setup`, and those of every environment
 
 from functools import lru_cache, partial
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
+from pam_envs.envs.core.arguments import Common, Randomization, environment_arguments, environments
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.knee import brace_kernels as L
 from pam_envs.plants.knee_orthosis import rows as R
@@ -49,7 +49,7 @@ REFERENCE_RANGES = {
 """Ranges of references, by mounting: those of yeh2010, within reach of 4.5 bar."""
 PAPER_PRESSURE = 0.69e5
 """Pressure [Pa], reached by inflation, at which the tension is 55 N as in yeh2010."""
-RANDOMISATION = Randomisation(
+RANDOMISATION = Randomization(
     R.NAMES,
     ("regulator.max_pressure", "lever.arm", "lever.fittings", "fixture.length"),
     "{'lever.stiffness': (25, 35)}",

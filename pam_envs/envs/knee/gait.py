@@ -43,7 +43,7 @@ Arguments: :func:`make_setup`, and those of every environment
 from functools import lru_cache, partial
 from typing import Any
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
+from pam_envs.envs.core.arguments import Common, Randomization, environment_arguments, environments
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.knee.gait_kernels import kernels_for
 from pam_envs.envs.knee.gait_layout import SOURCES
@@ -59,7 +59,7 @@ STARTS = ("random", "heel_contact")
 ASSISTANCE = {"signed": -1e9, "clipped": 0.0}
 """Lowest desired assistance [N m]."""
 TENSIONS, ANGLES, TORQUES = (0.0, 600.0), (1.0, 3.2), (-60.0, 60.0)
-RANDOMISATION = Randomisation(
+RANDOMISATION = Randomization(
     R.NAMES,
     (
         *("regulator.max_pressure", "lever.arm", "lever.fittings", "lever.mount_angle"),

@@ -1,7 +1,7 @@
 """Kernels of ``PAM/KneeWalk-v0`` and of stairs: sensors, references, wearer, report, start.
 
 The preview shows the references of the planned stride: from path and pace of the wearer, and from
-the nominal parameters of body and brace, before randomisation.
+the nominal parameters of body and brace, before randomization.
 """
 
 from functools import lru_cache

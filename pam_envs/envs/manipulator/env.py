@@ -45,7 +45,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
+from pam_envs.envs.core.arguments import Common, Randomization, environment_arguments, environments
 from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose, masses_of
 from pam_envs.envs.manipulator.kernels import kernels_for
 from pam_envs.envs.manipulator.layout import MODES, POSE, joint_names, muscle_names
@@ -61,7 +61,7 @@ RATES = (-6.0, 6.0)
 """Range [rad/s] of their rates."""
 MOST_PAYLOAD = 0.1
 """Largest payload [kg]. The largest one on some paths is less, which is checked."""
-RANDOMISATION = Randomisation(
+RANDOMISATION = Randomization(
     R.NAMES,
     ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
     "{'regulator.time_constant': (0.03, 0.06)}",

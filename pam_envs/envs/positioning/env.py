@@ -31,7 +31,7 @@ Arguments: :func:`make_setup`, and those of every environment
 from functools import lru_cache, partial
 from typing import Any
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
+from pam_envs.envs.core.arguments import Common, Randomization, environment_arguments, environments
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose, masses_of
 from pam_envs.envs.positioning.kernels import kernels_for
 from pam_envs.plants.single_muscle import rows as R
@@ -43,7 +43,7 @@ LOADS = (0.0, 2.55, 4.55)
 REFERENCE_RANGE = (0.001, 0.013)
 """Range of references [m]: within reach at every measured load."""
 HIGHEST_LOAD = 5.0
-RANDOMISATION = Randomisation(
+RANDOMISATION = Randomization(
     R.NAMES,
     ("mass.load", "regulator.max_pressure", "muscle.diameter", "muscle.braid_angle"),
     "{'mass.damping': (100, 500)}",

@@ -101,7 +101,7 @@ class Plant:
         declaration.
     ensemble : tuple of mapping
         Other parameter sets that fit the data equally well (parameter name to value; operators of
-        the hysteresis under ``"hysteresis.operator"``), for domain randomisation.
+        the hysteresis under ``"hysteresis.operator"``), for domain randomization.
     substeps : int
         Steps of the integrator in a control period.
     """

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pam_envs.envs.core.arguments import (
     Common,
-    Randomisation,
+    Randomization,
     environment_arguments,
     environments,
 )
@@ -162,7 +162,7 @@ def make_setup(given: Common) -> Setup:
     family, samples = given.reference_of(FAMILIES, "m", LONGEST)
     span = ("m", 0.0, LONGEST)
     pressure = ("Pa", 0.0, FULL)
-    drawn = Randomisation(("muscle.lag", "muscle.gain"), (), "{'muscle.lag': (0.05, 0.2)}")
+    drawn = Randomization(("muscle.lag", "muscle.gain"), (), "{'muscle.lag': (0.05, 0.2)}")
     return compose(
         plant,
         lambda effects: kernels(),
