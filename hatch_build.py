@@ -27,7 +27,7 @@ def renamed(source: str) -> str:
     return IMPORT.sub(rf"\1from {PACKAGE} import \2", FROM.sub(rf"\1{PACKAGE}.\2", source))
 
 
-class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]
+class CustomBuildHook(BuildHookInterface):
     """Copy the folders with renamed imports into the wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:

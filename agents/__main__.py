@@ -1,6 +1,7 @@
 """``python -m agents``: train, search, evaluate and enter policies."""
 
 import json
+import math
 import os
 import sys
 from pathlib import Path
@@ -71,8 +72,12 @@ def train(
         for given, own in ((given_env, run.config.env), (algo, run.config.algo), (seed, run.seed)):
             if given not in (None, own):
                 raise SettingsError(f"{folder} holds a run of {own}: leave {given} out")
-        model = training.resume(run)
-        console.print(f"continues at {model.num_timesteps:,} of {run.config.steps:,} steps")
+        if run.checkpoint.exists():
+            model = training.resume(run)
+            console.print(f"continues at {model.num_timesteps:,} of {run.config.steps:,} steps")
+        else:
+            model = training.start(run)
+            console.print(f"no checkpoint in {folder} yet: starts again with its settings")
     else:
         settings = _settings(name, kind, variant, config)
         changes = [*set, *([] if steps is None else [f"steps={steps}"])]
@@ -199,6 +204,60 @@ def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
     print(json.dumps({**made.card, "digest": made.digest()}, indent=1, sort_keys=True))
 
 
+def watch(
+    policy: Annotated[Path, tyro.conf.Positional],
+    /,
+    video: Path = Path("policy.mp4"),
+    seconds: float | None = None,
+    seed: int = 0,
+    fps: int = 25,
+) -> None:
+    """Write a film of a policy in the environment of its training.
+
+    Args:
+        policy: ONNX file of a policy.
+        video: Output file, .mp4 or .gif.
+        seconds: Length of the episode [s]; default: that of the training, at most 10 s.
+        seed: Seed of the episode.
+        fps: Frames per second.
+    """
+    from agents.training import own_policy
+
+    if seconds is not None and not seconds > 0.0:
+        raise SettingsError(f"seconds = {seconds:g} is not above 0; give the length in seconds")
+    arguments = own_policy.watch(policy, video, seconds, seed, fps)
+    print(f"wrote {video}: {', '.join(f'{k} {v}' for k, v in sorted(arguments.items()))}")
+
+
+def evaluate(
+    policies: Annotated[tuple[Path, ...], tyro.conf.Positional],
+    /,
+    controllers: tuple[str, ...] = (),
+    episodes: int | None = None,
+) -> None:
+    """Print a table of scores of policies and classical controllers on the same episodes.
+
+    The episodes have tuning seeds and the plants of the training of the first policy. RMS is the
+    error of the output in SI units, travel the mean change of the pressure setpoints in a control
+    period [Pa], failures the number of episodes that a limit ended.
+
+    Args:
+        policies: ONNX files of policies of one environment.
+        controllers: Classical controllers to compare with, for example inverse_pid.
+        episodes: Number of episodes; default: that of the training's evaluations.
+    """
+    from agents.training import own_policy
+
+    if not policies:
+        raise SettingsError("name policies, for example runs/*/*/policy.onnx")
+    _check_counts(episodes=(episodes, 1))
+    print(f"{'RMS':>11} {'return':>11} {'travel':>11} {'failures':>8}  name")
+    for name, score in own_policy.scores(policies, controllers, episodes):
+        numbers = (score.rms, score.mean_return, score.travel)
+        cells = [f"{'-' if math.isnan(n) else format(n, '.5g'):>11}" for n in numbers]
+        print(*cells, f"{score.failures:>8}  {name}", flush=True)
+
+
 def evaluations(policies: Annotated[tuple[Path, ...], tyro.conf.Positional], /) -> None:
     """Print the evaluations during training (tuning seeds) and the exported policy.
 
@@ -299,6 +358,8 @@ COMMANDS: dict[str, Any] = {
     "classical": classical,
     "enter": enter,
     "show": show,
+    "watch": watch,
+    "evaluate": evaluate,
     "evaluations": evaluations,
     "presets": presets,
 }

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import difflib
 import itertools
-import os
 import re
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import gymnasium as gym
-import numpy as np
 import tyro
-from numpy.typing import NDArray
 
 from pam_envs.doctor import doctor
 from pam_envs.envs.registration import full_id, register_all
-from pam_envs.envs.rendering.renderer import write_film
+from pam_envs.envs.rendering import film
 from pam_envs.envs.rendering.scene import view_of
 from pam_envs.export import command as exporting
 from pam_envs.hysteresis.protocol import kinds
@@ -86,18 +82,6 @@ def _names(signals: Signals) -> str:
     return ", ".join([*names, f"{coming} references to come"] if coming else names)
 
 
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Provide a temporary file beside ``path``, which replaces it on success."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 def render(
     env: tyro.conf.Positional[str],
     video: Path = Path("out.mp4"),
@@ -130,10 +114,7 @@ def render(
         Frames per second.
     """
     name = env_id(env)
-    if video.suffix not in (".mp4", ".gif"):
-        raise ValueError(f"--video {video} must end in .mp4 or .gif")
-    if not 1 <= fps <= 100:
-        raise ValueError(f"--fps {fps} must be from 1 to 100")
+    film.check(video, fps)
     given: dict[str, Any] = {"hysteresis": hysteresis, "episode_seconds": seconds}
     if name == "PAM/MusclePositioning-v0":
         given |= {"reference": "staircase", "load": 2.55, "start": "rest"}
@@ -142,28 +123,10 @@ def render(
     chosen = {"reference": reference, "load": load}
     given |= {key: value for key, value in chosen.items() if value is not None}
     made = gym.make(name, render_mode="rgb_array", **given)
-    with whole_file(video) as path:
-        write_film(path, _pictures(made, seconds, seed, fps), fps)
+    inner: Any = made.unwrapped
+    film.write(made, view_of(inner).demonstrator(inner), video, seconds, seed, fps)
     made.close()
     print(f"wrote {video}")
-
-
-def _pictures(env: Any, seconds: float, seed: int, fps: int) -> Iterator[NDArray[np.uint8]]:
-    """Run an episode under the inverse and yield its pictures."""
-    from rich.progress import track
-
-    inner = env.unwrapped
-    observation, _ = env.reset(seed=seed)
-    yield env.render()
-    policy, shown = view_of(inner).demonstrator(inner), 1
-    steps = round(seconds / inner.control_period)
-    for step in track(range(1, steps + 1), description="filming"):
-        observation, _, terminated, truncated, _ = env.step(policy(observation))
-        if step * inner.control_period * fps > shown - 1e-6:
-            shown += 1
-            yield env.render()
-        if terminated or truncated:
-            return
 
 
 def identify(out: Path = Path("identified"), members: int = 8) -> None:
@@ -180,7 +143,7 @@ def identify(out: Path = Path("identified"), members: int = 8) -> None:
 
     out.mkdir(parents=True, exist_ok=True)
     report = identify_all(out, members, lambda line: print(line, flush=True))
-    with whole_file(out / "identification.md") as path:
+    with film.whole_file(out / "identification.md") as path:
         path.write_text(report, encoding="utf-8")
     print(report)
 

@@ -28,6 +28,7 @@ PACKAGES = (
     *("torch", "stable_baselines3", "sb3_contrib", "onnx"),
 )
 CHECKPOINT = "checkpoint.pt"
+SETTINGS = "settings.json"
 CPU_FILE = Path("/proc/cpuinfo")
 
 

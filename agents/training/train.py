@@ -1,8 +1,9 @@
 """Training: a policy from settings, a seed and a folder; a killed run continues.
 
-The folder holds ``checkpoint.pt`` (:mod:`agents.training.snapshot`), ``tensorboard/`` and, at the
-end, ``policy.onnx`` with its record ``policy.json``. The exported policy is the best of those that
-were evaluated (:mod:`agents.training.best`), or the last without evaluations.
+The folder holds ``settings.json``, ``checkpoint.pt`` (:mod:`agents.training.snapshot`),
+``tensorboard/`` and, at the end, ``policy.onnx`` with its record ``policy.json``. The exported
+policy is the best of those that were evaluated (:mod:`agents.training.best`), or the last without
+evaluations.
 
 Exactness: a checkpoint is taken at the start of a rollout. A run that was killed and resumed ends
 with the same bits and the same ``policy.onnx`` as an uninterrupted one, for every algorithm,
@@ -28,7 +29,7 @@ from agents.training.best import Best
 from agents.training.building import make_env, make_model
 from agents.training.callbacks import Checkpoints, Evaluations
 from agents.training.checkpoint import CheckpointError
-from agents.training.record import CHECKPOINT, Clock, Run, cost
+from agents.training.record import CHECKPOINT, SETTINGS, Clock, Run, cost
 from sweeps.progress import progress
 
 
@@ -43,12 +44,21 @@ def start(run: Run) -> BaseAlgorithm:
     model = make_model(run.config, run.seed, make_env(run.config))
     if run.config.residual.controller:
         facts(model)
+    first = {"config": run.config.as_dict(), "seed": run.seed}
+    (run.folder / SETTINGS).write_text(json.dumps(first, indent=1), encoding="utf-8")
     return model
 
 
 def saved_run(folder: Path, steps: int | None = None) -> Run:
-    """Return the run of a folder's checkpoint, with another number of steps if given."""
-    settings = _settings(checkpoint.load(folder / CHECKPOINT))
+    """Return the run of a folder, with another number of steps if given.
+
+    The settings are those of the checkpoint; before the first one, those of the start.
+    """
+    first = folder / SETTINGS
+    if first.exists() and not (folder / CHECKPOINT).exists():
+        settings = json.loads(first.read_text(encoding="utf-8"))
+    else:
+        settings = _settings(checkpoint.load(folder / CHECKPOINT))
     given = settings["config"]
     if steps is not None:
         given = {**given, "steps": steps}

@@ -114,6 +114,18 @@ def test_a_checkpoint_cannot_run_code(tmp_path):
     assert not marker.exists()
 
 
+def test_run_killed_before_its_first_checkpoint_starts_again(tmp_path, capsys):
+    config = tiny(checkpoint_steps=512)
+    killed_after(Run(config, 5, tmp_path), 128)
+    assert not (tmp_path / CHECKPOINT).exists()
+    assert main(["train", "--resume", "--out", str(tmp_path)]) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "no checkpoint in" in said
+    assert "starts again with its settings" in said
+    card = OnnxPolicy.load(tmp_path / "policy.onnx").card
+    assert (card["seed"], configs.from_mapping(card["config"])) == (5, config)
+
+
 def test_a_run_is_neither_overwritten_nor_resumed_with_other_settings(ppo, tmp_path, capsys):
     folder = str(ppo[1])
     before = (ppo[1] / CHECKPOINT).read_bytes()

@@ -191,8 +191,9 @@ def test_worker_with_other_code_or_versions_refuses_the_training(other, tmp_path
 
 
 def test_code_is_every_python_file_of_the_packages(tmp_path, monkeypatch):
-    monkeypatch.setattr(record, "ROOT", tmp_path)
-    folders = [tmp_path / name for name in ("agents", "baselines", "pam_envs")]
+    assert [path.name for path in record.SOURCES] == ["agents", "baselines", "pam_envs"]
+    folders = [tmp_path / path.name for path in record.SOURCES]
+    monkeypatch.setattr(record, "SOURCES", folders)
 
     def digest() -> str:
         record.code.cache_clear()
