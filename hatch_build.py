@@ -1,5 +1,7 @@
 """Build of the wheel: the folders of the checkout become parts of the package ``pam_envs``.
 
+The links of the README become absolute once ``repository`` is set in pyproject.toml.
+
 ``baselines``, ``agents`` and ``sweeps`` are names that other distributions use, too. The wheel
 holds them as ``pam_envs.baselines`` and so on, with their imports renamed. Pretrained policies
 are not included.
@@ -12,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 PACKAGE = "pam_envs"
 FOLDERS = ("baselines", "agents", "sweeps")
@@ -20,6 +23,31 @@ LEFT_OUT = ("pretrained",)
 NAMES = "|".join(FOLDERS)
 FROM = re.compile(rf"^(\s*from )({NAMES})(?=[.\s])", re.MULTILINE)
 IMPORT = re.compile(rf"^(\s*)import ({NAMES})$", re.MULTILINE)
+LINK = re.compile(r"(!?)\[([^\]]*)\]\((?![a-z]+:|#)([^)\s]+)\)")
+
+
+def absolute(page: str, repository: str) -> str:
+    """Return a page whose relative links lead to a repository; unchanged without one."""
+    if not repository:
+        return page
+
+    def address(found: re.Match[str]) -> str:
+        kind = "raw" if found[1] else "blob"
+        return f"{found[1]}[{found[2]}]({repository.rstrip('/')}/{kind}/main/{found[3]})"
+
+    return LINK.sub(address, page)
+
+
+class CustomMetadataHook(MetadataHookInterface):
+    """Read the README, and the address of the repository from the settings of the hook."""
+
+    def update(self, metadata: dict[str, Any]) -> None:
+        """Add readme and addresses."""
+        repository: str = self.config["repository"]
+        text = (Path(self.root) / "README.md").read_text(encoding="utf-8")
+        page = {"content-type": "text/markdown", "text": absolute(text, repository)}
+        metadata["readme"] = page
+        metadata["urls"] = {"Repository": repository} if repository else {}
 
 
 def renamed(source: str) -> str:

@@ -2,6 +2,8 @@
 
 import ast
 import os
+import re
+import runpy
 import subprocess
 import sys
 import zipfile
@@ -83,6 +85,26 @@ def test_snippets_of_the_readme_run_from_the_wheel(installed, tmp_path):
     page = str(ROOT / "README.md")
     said = run(installed, "-W", "error", "-c", RUN_README, str(installed), page, where=tmp_path)
     assert 0.0 < float(said.rpartition("rms")[2]) < 0.5e-3  # m
+
+
+def test_links_of_the_readme_are_absolute_with_a_repository():
+    pytest.importorskip("hatchling")
+    absolute = runpy.run_path(str(ROOT / "hatch_build.py"))["absolute"]
+    page = (ROOT / "README.md").read_text()
+    assert absolute(page, "") == page
+    made = absolute(page, "https://example.org/lab/pam-envs")
+    assert "(https://example.org/lab/pam-envs/blob/main/docs/identification.md)" in made
+    assert "(https://example.org/lab/pam-envs/raw/main/docs/images/knee_stride.png)" in made
+    links = re.findall(r"\]\(([^)\s]+)\)", made)
+    assert all(link.startswith(("https://", "#")) for link in links)
+
+
+def test_wheel_has_the_readme_and_the_versions_of_python(installed):
+    text = next(installed.glob("*.dist-info/METADATA")).read_text()
+    assert "Description-Content-Type: text/markdown" in text
+    assert "# pam-envs" in text
+    for minor in (11, 12, 13, 14):
+        assert f"Classifier: Programming Language :: Python :: 3.{minor}" in text
 
 
 def test_agents_run_from_the_wheel(installed, tmp_path):
