@@ -28,6 +28,15 @@ def test_snippets_of_the_readme_run(tmp_path, monkeypatch):
     assert (tmp_path / "slow.yaml").exists()
 
 
+def test_snippets_with_other_libraries_run(tmp_path, monkeypatch):
+    pytest.importorskip("stable_baselines3")
+    monkeypatch.chdir(tmp_path)
+    names = run_snippets(ROOT / "docs/other_libraries.md")
+    assert names["cost"] >= 0.0
+    assert names["first"].shape == (64, 10)
+    assert (tmp_path / "rig.csv").read_text().startswith("time_s,segment,pressure_command_bar")
+
+
 def test_snippets_of_the_orthosis_print_the_stated_output(capsys):
     pytest.importorskip("cvxpy")
     names = run_snippets(ROOT / "docs/knee_orthosis.md")

@@ -1,0 +1,1 @@
+"""Real-time environment around a rig: the signals and controllers of a simulated environment."""
