@@ -13,7 +13,15 @@ from pam_envs.constants import GRAVITY
 from pam_envs.diagnosis.cause import Form
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base, frees_for
-from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of, evaluate, improve
+from pam_envs.diagnosis.fit.least_squares import (
+    FEW_DAMPINGS,
+    Fit,
+    Free,
+    Problem,
+    column_of,
+    evaluate,
+    improve,
+)
 from pam_envs.diagnosis.fit.single_muscle import CLOCK, LAG, ORIFICES, PILOT, MuscleFamily
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -151,7 +159,7 @@ def regulator(
 def _simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
     """Return the best of some fits; one with more parameters needs a gain."""
     evaluate(problem, fits)
-    improve(problem, fits, rounds, 1e-4)
+    improve(problem, fits, rounds, 1e-4, FEW_DAMPINGS)
     errors = [blocks.errors(problem.rows(fit.residual)) for fit in fits]
     chosen = 0
     for k in range(1, len(fits)):

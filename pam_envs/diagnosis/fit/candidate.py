@@ -60,13 +60,15 @@ def initial_fits(
     cause: Cause,
     form: Form,
     shared: lsq.Shared | None = None,
+    starts: Sequence[Sequence[float]] | None = None,
 ) -> list[lsq.Fit]:
-    """Return the fits of a form at their starting points, with the base's Jacobian."""
+    """Return the fits of a form at starting points (default: all), with the base's Jacobian."""
     names = {f.name for f in base.frees}
     if not any(t.amount and t.name not in names for t in form.terms):
         return []
     fits = []
-    for values in starting_points(problem, family, base, form):
+    points = starting_points(problem, family, base, form) if starts is None else starts
+    for values in points:
         frees = tuple(f for f in frees_for(family, form, values) if f.name not in names)
         z = np.concatenate([base.z, [f.inner(f.start) for f in frees]])
         fits.append(
@@ -78,13 +80,13 @@ def initial_fits(
 def polish(problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH) -> None:
     """Improve fits with the Jacobian of all their parameters."""
     for fit in fits:
-        fit.done, fit.damping, fit.shared = False, 1.0, None
+        fit.done, fit.damping, fit.shared, fit.slopes = False, 1.0, None, fit.slopes[:0]
     lsq.improve(problem, fits, rounds, POLISHED_ENOUGH)
 
 
 def complete_jacobian(problem: lsq.Problem, fit: lsq.Fit) -> None:
     """Compute the Jacobian of a fit by all its parameters, if it is missing."""
-    if fit.shared is not None or len(fit.slopes) != len(fit.frees):
+    if fit.shared is not None or not fit.fresh:
         fit.shared = None
         lsq.differentiate(problem, [fit])
 
@@ -124,7 +126,8 @@ def best_by_name(fits: Iterable[tuple[str, lsq.Fit]]) -> dict[str, lsq.Fit]:
 def restarted(fit: lsq.Fit, **changes: Any) -> lsq.Fit:
     """Return a copy of a fit in its initial state."""
     empty = np.zeros((0, 0))
-    return replace(fit, done=False, damping=1.0, begins={}, slopes=empty, **changes)
+    anew = replace(fit, done=False, damping=1.0, begins={}, slopes=empty, fresh=False)
+    return replace(anew, **changes)
 
 
 def without_each_cause(

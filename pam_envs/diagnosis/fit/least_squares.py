@@ -3,19 +3,21 @@
 A *column* holds all parameters of a plant; a *free* parameter is changed by a fit. Every perturbed
 or tried parameter set is a lane of one replay. Fits that share their first free parameters (the
 base) and differ in a few more (a cause) share the base's Jacobian, computed once at the base's
-optimum: near it the steps are close to Gauss-Newton, at a tenth of the simulations.
+optimum: near it the steps are close to Gauss-Newton, at a tenth of the simulations. A fit with a
+Jacobian of its own follows it by secant updates (broyden1965) and computes it again when they no
+longer help.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
 import numpy as np
 
 from pam_envs.arrays import Array, Flags, Indices
 
-DAMPINGS = (1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
+DAMPINGS = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.3)
 """Levenberg-Marquardt dampings tried side by side, each in a lane of the replay."""
 FEW_DAMPINGS = (1e-6, 1e-3, 0.3)
 LEAST_DAMPING = 1e-9  # regularisation of the normal equations
@@ -59,6 +61,38 @@ class Free:
         return 0.01 if self.log else 0.02
 
 
+@dataclass(frozen=True)
+class Table:
+    """Settings of several free parameters, each of shape (n,)."""
+
+    place: Indices
+    log: Flags
+    scale: Array
+    bounds: Array  # (2, n): in the parameters' own units
+    spans: Array  # (2, n): in internal coordinates
+    start: Array  # internal coordinates
+    precision: Array  # 1 / prior**2, 0 without a prior
+
+    def outer(self, z: Array) -> Array:
+        """Return the values of internal coordinates (..., n), clipped to the bounds."""
+        raw = np.where(self.log, np.exp(np.where(self.log, np.clip(z, -700, 700), 0.0)), 0.0)
+        return np.clip(np.where(self.log, raw, z * self.scale), *self.bounds)
+
+
+@lru_cache(maxsize=512)
+def table_of(frees: tuple[Free, ...]) -> Table:
+    """Return the settings of free parameters as arrays."""
+    return Table(
+        np.array([f.place for f in frees], np.int64),
+        np.array([f.log for f in frees], bool),
+        np.array([f.scale for f in frees]),
+        np.array([[f.low for f in frees], [f.high for f in frees]]),
+        np.array([f.span for f in frees]).reshape(len(frees), 2).T,
+        np.array([f.inner(f.start) for f in frees]),
+        np.array([f.prior**-2 if np.isfinite(f.prior) else 0.0 for f in frees]),
+    )
+
+
 class PlantFamily(Protocol):
     """A plant with fixed inputs that can be diagnosed; see also :attr:`Problem.tie`."""
 
@@ -91,6 +125,7 @@ class Fit:
     cost: float = np.inf  # sum of squares of the training residuals, priors included
     residual: Array = field(default_factory=lambda: np.zeros(0))  # (m,): simulated less measured
     slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, m): by the last k of z
+    fresh: bool = False  # whether the slopes are differences at z, not secant updates
     shared: Shared | None = None  # derivatives by the coordinates before them
     damping: float = 1.0  # factor on the dampings of the next round
     done: bool = False  # whether the fit has converged or was stopped
@@ -109,7 +144,13 @@ class Fit:
 
     def values(self) -> dict[str, float]:
         """Return the fitted values by name."""
-        return {f.name: float(f.outer(z)) for f, z in zip(self.frees, self.z, strict=True)}
+        outer = self.table.outer(self.z)
+        return {f.name: float(v) for f, v in zip(self.frees, outer, strict=True)}
+
+    @property
+    def table(self) -> "Table":
+        """Settings of the free parameters as arrays."""
+        return table_of(self.frees)
 
 
 @dataclass(frozen=True)
@@ -190,30 +231,27 @@ class Problem:
 
 
 def column_of(fit: Fit, z: Array) -> Array:
-    """Return the column of a fit at internal coordinates ``z``."""
-    column = fit.column.copy()
-    for free, value in zip(fit.frees, z, strict=True):
-        column[free.place] = free.outer(value)
+    """Return the columns of a fit at internal coordinates ``z`` (..., n), shape (..., p)."""
+    column = np.tile(fit.column, (*z.shape[:-1], 1)) if z.ndim > 1 else fit.column.copy()
+    column[..., fit.table.place] = fit.table.outer(z)
     return column
 
 
-def _cost(problem: Problem, fit: Fit, z: Array, residual: Array) -> float:
-    seen = residual[: problem.seen]
-    priors = sum(
-        ((v - f.inner(f.start)) / f.prior) ** 2
-        for f, v in zip(fit.frees, z, strict=True)
-        if np.isfinite(f.prior)
-    )
-    unphysical = problem.penalty(column_of(fit, z)[None])[0]
-    return float(np.einsum("i,i", seen, seen)) + float(priors) + float(unphysical)
+def _costs(problem: Problem, fit: Fit, tried: Array, columns: Array, residuals: Array) -> Array:
+    """Return the costs of tried coordinates (k, n) with their columns and residuals."""
+    seen = residuals[:, : problem.seen]
+    priors = (tried - fit.table.start) ** 2 @ fit.table.precision
+    return np.asarray(np.einsum("ki,ki->k", seen, seen) + priors + problem.penalty(columns))
 
 
 def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:
     """Compute residual and cost of fits at their present coordinates."""
-    found = problem.residuals(np.array([column_of(f, f.z) for f in fits]))
-    for fit, residual in zip(fits, found, strict=True):
-        fit.residual = residual.copy()
-        fit.cost = _cost(problem, fit, fit.z, residual)
+    columns = np.array([column_of(f, f.z) for f in fits])
+    found = problem.residuals(columns)
+    for k, fit in enumerate(fits):
+        part = slice(k, k + 1)
+        fit.residual = found[k].copy()
+        fit.cost = float(_costs(problem, fit, fit.z[None], columns[part], found[part])[0])
 
 
 def shifted(fit: Fit, k: int) -> tuple[Array, float]:
@@ -242,6 +280,7 @@ def differentiate(problem: Problem, fits: Sequence[Fit]) -> None:
             fit.slopes = np.zeros((0, len(fit.residual)))
             continue
         fit.slopes = (found[at : at + n] - fit.residual) / np.array(steps[at : at + n])[:, None]
+        fit.fresh = True
         at += n
 
 
@@ -260,19 +299,18 @@ def normal_equations(problem: Problem, fit: Fit) -> tuple[Array, Array]:
         across = np.einsum("im,jm->ij", own, fit.shared.slopes)
         normal = np.block([[fit.shared.gram, across.T], [across, normal]])
         gradient = np.concatenate([np.einsum("im,m->i", fit.shared.slopes, residual), gradient])
-    for k, (free, z) in enumerate(zip(fit.frees, fit.z, strict=True)):
-        if np.isfinite(free.prior):
-            normal[k, k] += free.prior**-2
-            gradient[k] += (z - free.inner(free.start)) / free.prior**2
+    table = fit.table
+    normal[np.diag_indices(len(fit.z))] += table.precision
+    gradient += (fit.z - table.start) * table.precision
     return normal, gradient
 
 
-def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> list[Array]:
-    """Return the coordinates reached with each damping."""
+def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> Array:
+    """Return the coordinates reached with each damping, shape (dampings, n)."""
     normal, gradient = normal_equations(problem, fit)
-    spans = np.array([f.span for f in fit.frees])
-    reach = np.array([REACH_LOG if f.log else REACH for f in fit.frees])
-    low, high = spans[:, 0] - fit.z, spans[:, 1] - fit.z
+    table = fit.table
+    reach = np.where(table.log, REACH_LOG, REACH)
+    low, high = table.spans - fit.z
     scale = np.sqrt(np.diag(normal)) + 1e-6
     scaled, slope = normal / np.outer(scale, scale), gradient / scale
     tried = []
@@ -280,7 +318,7 @@ def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> list[Array]
         step = bounded_step(scaled, slope, fit.damping * relative, low * scale, high * scale)
         step /= scale
         tried.append(fit.z + step / max(1.0, float(np.max(np.abs(step) / reach))))
-    return tried
+    return np.array(tried)
 
 
 def bounded_step(normal: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
@@ -312,25 +350,54 @@ def improve(
     tolerance: float,
     dampings: Sequence[float] = DAMPINGS,
 ) -> None:
-    """Improve fits by damped Gauss-Newton steps, all fits side by side."""
+    """Improve fits by damped Gauss-Newton steps, all fits side by side.
+
+    A fit ends when a step with a fresh Jacobian decreases its cost by less than ``tolerance``,
+    relative to the cost.
+    """
     for _ in range(rounds):
         active = [f for f in fits if not f.done]
         if not active:
             return
-        differentiate(problem, active)
+        differentiate(problem, [f for f in active if f.held or not len(f.slopes)])
         tried = [_steps(problem, f, dampings) for f in active]
-        found = problem.residuals(
-            np.array([column_of(f, z) for f, zs in zip(active, tried, strict=True) for z in zs])
-        )
+        columns = np.concatenate([column_of(f, z) for f, z in zip(active, tried, strict=True)])
+        found = problem.residuals(columns)
         for i, (fit, zs) in enumerate(zip(active, tried, strict=True)):
-            rows = found[i * len(zs) : (i + 1) * len(zs)]
-            costs = [_cost(problem, fit, z, r) for z, r in zip(zs, rows, strict=True)]
+            part = slice(i * len(zs), (i + 1) * len(zs))
+            costs = _costs(problem, fit, zs, columns[part], found[part])
             best = int(np.argmin(costs))
-            if costs[best] < fit.cost:
-                fit.done = fit.cost - costs[best] < tolerance * fit.cost
-                fit.cost, fit.z, fit.residual = costs[best], zs[best], rows[best].copy()
-                fit.damping = 1.0
-            elif fit.damping > 1.0:
-                fit.done = True
-            else:
-                fit.damping = STALLED
+            _step(problem, fit, zs[best], float(costs[best]), found[part][best], tolerance)
+
+
+def _step(
+    problem: Problem, fit: Fit, z: Array, cost: float, residual: Array, tolerance: float
+) -> None:
+    """Take a step that decreases the cost; update the Jacobian, or ask for another one."""
+    better = cost < fit.cost
+    sufficient = fit.cost - cost >= tolerance * fit.cost
+    own, fresh = not fit.held, fit.fresh
+    if better:
+        step, change = z - fit.z, residual - fit.residual
+        fit.cost, fit.z, fit.residual, fit.fresh = cost, z, residual.copy(), False
+        if sufficient:
+            fit.damping = 1.0
+            if own:
+                _secant(problem, fit, step, change)
+            return
+    if own and not fresh:
+        fit.slopes, fit.damping = fit.slopes[:0], 1.0
+    elif better or fit.damping > 1.0:
+        fit.done = True
+    else:
+        fit.damping = STALLED
+
+
+def _secant(problem: Problem, fit: Fit, step: Array, change: Array) -> None:
+    """Update a Jacobian by the change of the residual along a step."""
+    seen = fit.slopes[:, : problem.seen]
+    weights = np.einsum("im,im->i", seen, seen) * step
+    length = float(weights @ step)
+    if length > 0.0:
+        missing = change - step @ fit.slopes
+        fit.slopes = fit.slopes + np.outer(weights / length, missing)
