@@ -30,7 +30,6 @@ from pam_envs.pneumatics.flow import REPLACED
 FAST = 0.04  # lag [s] below which the replay takes finer steps
 FINE_STEP = 0.0101
 GUESS_ROUNDS, ROUNDS = 6, 12
-FAR = 8.0  # cost per reading above which a fit may be in a local optimum
 SLOW = 0.008  # speed [m/s] below which a sample is an equilibrium of forces
 MOST = 4000  # largest number of samples
 
@@ -58,11 +57,10 @@ def calibrate(
     """Fit the base of a plant.
 
     The regulator is fitted first, to the pressure alone, in several orders; then the static map
-    and the friction by a regression of the force balance; then all parameters by simulation. If
-    that fit is far from the readings, a second one starts from the given plant, and the better
-    of the two is kept. ``measured`` (channels, T) is NaN where there is no reading, ``noise``
-    is its RMS (channels,), ``shapes`` those of :class:`Problem`; ``rates`` are the forms of a
-    limited rate that the regulator may have.
+    and the friction by a regression of the force balance; then all parameters by simulation, from
+    that guess and from the given plant. ``measured`` (channels, T) is NaN where there is no
+    reading, ``noise`` is its RMS (channels,), ``shapes`` those of :class:`Problem`; ``rates`` are
+    the forms of a limited rate that the regulator may have.
     """
     extra = np.zeros((0, 0)) if shapes is None else shapes
     longest = float(np.nanmax(measured[0], initial=0.0))
@@ -90,12 +88,7 @@ def calibrate(
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column
-    best = fit_base(problem, blocks, plain, tried[0], ROUNDS)
-    for start in tried[1:]:
-        if best.fit.cost < FAR * problem.seen:
-            break
-        other = fit_base(problem, blocks, plain, start, ROUNDS)
-        best = min(best, other, key=lambda c: c.fit.cost)
+    best = fit_base(problem, blocks, plain, tried, ROUNDS)
     return Calibration(family, problem, best, found | law, rate)
 
 

@@ -124,7 +124,8 @@ class Fit:
     column: Array  # all other parameters
     cost: float = np.inf  # sum of squares of the training residuals, priors included
     residual: Array = field(default_factory=lambda: np.zeros(0))  # (m,): simulated less measured
-    slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, m): by the last k of z
+    slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, m): by the last k of z;
+    # of a fit with secant updates perhaps on training samples only
     fresh: bool = False  # whether the slopes are differences at z, not secant updates
     shared: Shared | None = None  # derivatives by the coordinates before them
     damping: float = 1.0  # factor on the dampings of the next round
@@ -222,6 +223,12 @@ class Problem:
         left = np.nan_to_num((outputs - self.measured) / self.noise[:, None])
         sizes = [solver @ row for (_, solver), row in zip(self._solvers, left, strict=True)]
         return np.asarray(outputs - np.array(sizes) @ self.shapes * self.noise[:, None])
+
+    def carried(self, slopes: Array, other: "Problem") -> Array:
+        """Return slopes (k, m) in the order of the residuals of a problem with other samples."""
+        flat = np.empty_like(slopes)
+        flat[:, self.order] = slopes
+        return flat[:, other.order]
 
     def rows(self, residual: Array) -> Array:
         """Return a residual vector as an array of shape (channels, T)."""
@@ -349,11 +356,12 @@ def improve(
     rounds: int,
     tolerance: float,
     dampings: Sequence[float] = DAMPINGS,
+    renew: bool = True,
 ) -> None:
     """Improve fits by damped Gauss-Newton steps, all fits side by side.
 
-    A fit ends when a step with a fresh Jacobian decreases its cost by less than ``tolerance``,
-    relative to the cost.
+    A fit ends when a step decreases its cost by less than ``tolerance``, relative to the cost, and
+    with ``renew`` only if its Jacobian was fresh.
     """
     for _ in range(rounds):
         active = [f for f in fits if not f.done]
@@ -367,11 +375,18 @@ def improve(
             part = slice(i * len(zs), (i + 1) * len(zs))
             costs = _costs(problem, fit, zs, columns[part], found[part])
             best = int(np.argmin(costs))
-            _step(problem, fit, zs[best], float(costs[best]), found[part][best], tolerance)
+            cost = float(costs[best])
+            _step(problem, fit, zs[best], cost, found[part][best], tolerance, renew)
 
 
 def _step(
-    problem: Problem, fit: Fit, z: Array, cost: float, residual: Array, tolerance: float
+    problem: Problem,
+    fit: Fit,
+    z: Array,
+    cost: float,
+    residual: Array,
+    tolerance: float,
+    renew: bool,
 ) -> None:
     """Take a step that decreases the cost; update the Jacobian, or ask for another one."""
     better = cost < fit.cost
@@ -385,7 +400,7 @@ def _step(
             if own:
                 _secant(problem, fit, step, change)
             return
-    if own and not fresh:
+    if renew and own and not fresh:
         fit.slopes, fit.damping = fit.slopes[:0], 1.0
     elif better or fit.damping > 1.0:
         fit.done = True
@@ -399,5 +414,5 @@ def _secant(problem: Problem, fit: Fit, step: Array, change: Array) -> None:
     weights = np.einsum("im,im->i", seen, seen) * step
     length = float(weights @ step)
     if length > 0.0:
-        missing = change - step @ fit.slopes
+        missing = change[: fit.slopes.shape[1]] - step @ fit.slopes
         fit.slopes = fit.slopes + np.outer(weights / length, missing)

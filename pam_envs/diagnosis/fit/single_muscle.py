@@ -59,6 +59,8 @@ ORIFICES = {
     "regulator.source_pressure": 8e5,
 }
 """Parameters of a regulator with flow through its orifices, with their starting values."""
+SOURCE, LEAST_SOURCE = "regulator.source_pressure", 1.001
+"""Pressure of the supply, and the least one over the largest setpoint."""
 LAG = "regulator.time_constant"
 PILOT = {"regulator.pilot_lag": 0.02, "regulator.pilot_damping": 1.0}
 """Starting values of the pilot stage of a regulator of second order."""
@@ -209,6 +211,8 @@ class MuscleFamily:
         d, value = declared(self.plant, name), self.plant.value(name)
         made = dict(low=d.low, high=d.high, start=value)
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
+        if name == SOURCE:  # a muscle is filled from above its largest setpoint
+            made["low"] = max(d.low, LEAST_SOURCE * self.plant.regulator.max_pressure)
         return Free(name, R.place(name), **{**made, **SETTINGS.get(name, {}), **changes})
 
     def base(self) -> tuple[Free, ...]:
