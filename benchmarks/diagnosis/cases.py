@@ -12,7 +12,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.diagnosis.sources import (
     HOME,
@@ -31,6 +30,7 @@ from pam_envs.diagnosis.audit.noise import noise_floor
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.decide.isolability import projected
 from pam_envs.diagnosis.diagnosis import Study
+from pam_envs.diagnosis.fit.least_squares import Problem
 from pam_envs.diagnosis.fit.single_muscle import start_plant
 from tests.diagnosis import hidden
 
@@ -103,14 +103,12 @@ class Ground:
     campaign: hidden.Campaign
     clean: Array  # outputs without effect and noise [m], [Pa], shape (2, T)
     basis: Array  # orthonormal basis of the subspace
-    order: NDArray[np.int64]  # of a flattened trace in it
+    problem: Problem  # order of the residuals
 
     def left(self, trace: Array) -> Array:
         """Return the part of a trace (2, T) [m], [Pa] that a refit does not absorb, over noise."""
-        flat = (trace / NOISE[:, None]).ravel()
-        rows = np.empty_like(flat)
-        rows[self.order] = projected(flat[self.order][None], self.basis)[0]
-        return rows.reshape(trace.shape)
+        whole = self.problem.vectors((trace / NOISE[:, None]).reshape(1, -1))
+        return self.problem.rows(projected(whole, self.basis)[0])
 
     def size(self, trace: Array) -> float:
         """Return the size of a trace."""
@@ -160,7 +158,7 @@ def ground_of(base: Any, campaign: hidden.Campaign, seed: int = 0) -> Ground:
     floor = noise_floor(recording, sheet)
     study = Study.begin(recording, sheet, start_plant(sheet), floor)
     study.make_flexible(catalogue())
-    return Ground(base, campaign, clean, study.subspace, study.problem.order)
+    return Ground(base, campaign, clean, study.subspace, study.problem)
 
 
 def solve(ground: Ground, effect: Any, target: float) -> tuple[float, Array] | None:

@@ -62,9 +62,10 @@ def remaining_structure(
         rest -= float(np.log(1.0 - min(share, 0.999)))
         peaks.append(spectral_peak(row, period, regressors.values["pressure"]))
     some = blocks.counts.sum(axis=1) > 0
-    excess = float(np.max(blocks.means(candidate.errors)[some], initial=0.0))
-    peak = max(p[1] for p in peaks)
-    return {"r2": r2, "rest": rest, "peaks": peaks, "peak": peak, "excess": excess}
+    means = blocks.means(candidate.errors)
+    by_channel = [float(v) if s else 0.0 for v, s in zip(means, some, strict=True)]
+    found = {"r2": r2, "rest": rest, "peaks": peaks, "peak": max(p[1] for p in peaks)}
+    return found | {"excess": max(by_channel), "by_channel": by_channel}
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,10 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
-from scipy.optimize import lsq_linear
 
 from pam_envs.arrays import Array
-from pam_envs.constants import GRAVITY
 from pam_envs.diagnosis.cause import Form
+from pam_envs.diagnosis.fit.balance import Balance
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base, frees_for
 from pam_envs.diagnosis.fit.least_squares import (
@@ -29,9 +27,7 @@ from pam_envs.pneumatics.flow import REPLACED
 
 FAST = 0.04  # lag [s] below which the replay takes finer steps
 FINE_STEP = 0.0101
-GUESS_ROUNDS, ROUNDS = 6, 12
-SLOW = 0.008  # speed [m/s] below which a sample is an equilibrium of forces
-MOST = 4000  # largest number of samples
+GUESS_ROUNDS, ROUNDS = 6, 10
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +62,15 @@ def calibrate(
     longest = float(np.nanmax(measured[0], initial=0.0))
     family = dataclasses.replace(family, longest=longest)
     problem = Problem(
-        family.simulate, measured, noise, blocks.train, time, family.tie, extra, family.penalty
+        family.simulate,
+        measured,
+        noise,
+        blocks.train,
+        time,
+        family.tie,
+        extra,
+        family.violations,
+        family.checks,
     )
     column, rate = family.column, None
     found: dict[str, float] = {}
@@ -77,19 +81,24 @@ def calibrate(
         if family.plant.air == "regulator" and found[LAG] < FAST:
             family = family.finer(FINE_STEP)
         problem = dataclasses.replace(
-            problem, simulate=family.simulate, tie=family.tie, penalty=family.penalty
+            problem, simulate=family.simulate, tie=family.tie, violations=family.violations
         )
         column = column_of(fit, fit.z)
     frees = family.base()
-    tried, law = [frees], {}
+    tried: list[tuple[Free, ...]] = [frees]
+    law: dict[str, float] = {}
+    wide: dict[str, float] = {}
     plays = family.plant.hysteresis.model.kind == PlayOperator.kind
     if np.isfinite(measured[0]).any() and plays:
-        law = balance(family, measured[0], family.simulate(column[None])[1, :, 0])
+        pressure = family.simulate(column[None])[1, :, 0]
+        slow = Balance.of(family, measured[0], pressure, noise[0])
+        if slow is not None:
+            law, wide = slow.solve(), slow.flexible()
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column
     best = fit_base(problem, blocks, plain, tried, ROUNDS)
-    return Calibration(family, problem, best, found | law, rate)
+    return Calibration(family, problem, best, found | law | wide, rate)
 
 
 ORDER_GAIN = 0.05
@@ -177,57 +186,6 @@ def orifices_of(plant: SingleMuscle) -> SingleMuscle:
     source = max(ORIFICES["regulator.source_pressure"], 1.2 * plant.regulator.max_pressure)
     values = {**ORIFICES, "regulator.source_pressure": source, "regulator.pilot_lag": 0.0}
     return plant.replace(values).with_air("flow")
-
-
-def balance(family: MuscleFamily, contraction: Array, pressure: Array) -> dict[str, float]:
-    """Return coefficients of the static law and play weights; none with too few slow samples.
-
-    In slow motion the load equals the force law, which is linear in its coefficients for given play
-    outputs. The result only starts a fit, since its regressors contain noise. ``contraction`` (T,)
-    are readings [m], NaN where there is none, ``pressure`` (T,) is simulated [Pa].
-    """
-    plant, load, period = family.plant, family.inputs.load, family.inputs.period
-    usable = np.isfinite(contraction)
-    below = plant._absolute(np.zeros(1), load[:1])[0] if load[0] > 0 else 0.0
-    contraction = contraction + float(below)  # relative to the unloaded rest length
-    window = max(3, round(0.1 / period))
-    smooth = uniform_filter1d(np.nan_to_num(contraction), window)
-    pace = np.abs(np.gradient(smooth, period))
-    rows = np.flatnonzero(usable & (uniform_filter1d(pace, window) < SLOW))
-    if len(rows) < 200:
-        return {}
-    rows = rows[:: max(1, len(rows) // MOST)]
-    e, p = smooth[rows] / plant.muscle.rest_length, pressure[rows]
-    thresholds: tuple[float, ...] = plant.hysteresis.model.thresholds  # type: ignore[attr-defined]
-    plays = [PlayOperator((size,), (1.0,), 0.0).simulate(pressure)[0] for size in thresholds]
-    gaps = (pressure - np.reshape(plays, (len(thresholds), len(pressure))))[:, rows]
-    force = load[rows] * GRAVITY
-    bend = -np.expm1(-e / plant.muscle.braid_strain)
-    passive = [-bend, -e, -(e**2), -(e**3), -(e**4)]
-    taper = np.zeros(len(rows))
-    found: dict[str, float] = {}
-    for _ in range(3):
-        columns = np.array([p, -e * p, -(e**2) * p, *passive, *(-gaps * (1.0 - taper))]).T
-        scale = np.linalg.norm(columns, axis=0) + 1e-12
-        low = np.full(columns.shape[1], -np.inf)
-        low[[0, 3]] = 0.0
-        low[8:] = 0.0
-        solved = lsq_linear(columns / scale, force, (low, np.full(len(low), np.inf)))
-        c = solved.x / scale
-        area = max(c[0], 1e-6)
-        taper = np.clip((c[1] * e + c[2] * e**2) / area, -1.0, 0.95)
-        found = {
-            "muscle.area": area,
-            "muscle.area_taper": c[1] / area,
-            "muscle.area_curve": c[2] / area,
-            "muscle.braid_force": max(c[3], 1e-3),
-            "muscle.stiffness": c[4],
-            "muscle.softening": c[5],
-            "muscle.hardening": c[6],
-            "muscle.stiffening": c[7],
-        }
-        found |= {f"hysteresis.weight[{k}]": w / area for k, w in enumerate(c[8:])}
-    return found
 
 
 def start_at_guess(frees: tuple[Free, ...], found: dict[str, float]) -> tuple[Free, ...]:

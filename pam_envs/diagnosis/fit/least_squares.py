@@ -21,6 +21,7 @@ DAMPINGS = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.3)
 """Levenberg-Marquardt dampings tried side by side, each in a lane of the replay."""
 FEW_DAMPINGS = (1e-6, 1e-3, 0.3)
 LEAST_DAMPING = 1e-9  # regularisation of the normal equations
+RENEWED = 4  # number of secant updates after which a Jacobian is computed again
 STALLED = 1e3  # factor on all dampings after a round without improvement
 REACH_LOG, REACH = 1.0, 30.0  # longest steps in internal coordinates
 SHAPE_PRIOR = 50.0
@@ -127,6 +128,7 @@ class Fit:
     slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, m): by the last k of z;
     # of a fit with secant updates perhaps on training samples only
     fresh: bool = False  # whether the slopes are differences at z, not secant updates
+    age: int = 0  # number of secant updates since
     shared: Shared | None = None  # derivatives by the coordinates before them
     damping: float = 1.0  # factor on the dampings of the next round
     done: bool = False  # whether the fit has converged or was stopped
@@ -158,7 +160,8 @@ class Fit:
 class Problem:
     """Data and simulation shared by fits.
 
-    The weighted residuals of all channels form one vector, the training samples first.
+    The weighted residuals of all channels form one vector, the training samples first; between
+    them and the held-out samples are the violations.
     """
 
     simulate: Callable[[Array], Array]  # from columns (n, p) to outputs (channels, T, n)
@@ -170,19 +173,25 @@ class Problem:
     # (k, T): shapes that the readings of every channel may contain beside the plant's (zero offset,
     # settling at the start); their sizes are solved for in every residual
     shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    # cost of columns (n, p) that are not physical, shape (n,)
-    penalty: Callable[[Array], Array] = lambda columns: np.zeros(len(columns))
+    # violations of what is physical by columns (n, p), over their tolerance, shape (n, k)
+    violations: Callable[[Array], Array] = lambda columns: np.zeros((len(columns), 0))
+    checks: int = 0  # their number k
 
     @cached_property
     def order(self) -> Indices:
-        """Index into the flattened (channels, T) of each entry of a residual vector."""
+        """Index into the flattened (channels, T) of each sample of a residual vector."""
         mask = np.tile(self.train, len(self.measured))
         return np.concatenate([np.flatnonzero(mask), np.flatnonzero(~mask)])
 
     @cached_property
-    def seen(self) -> int:
+    def sampled(self) -> int:
         """Number of leading entries of a residual vector that are training samples."""
         return int(self.train.sum()) * len(self.measured)
+
+    @cached_property
+    def seen(self) -> int:
+        """Number of leading entries of a residual vector that a fit sees."""
+        return self.sampled + self.checks
 
     def residuals(self, columns: Array) -> Array:
         """Return weighted residuals, shape (n, channels * T); zero for missing readings."""
@@ -200,7 +209,16 @@ class Problem:
             for k, (shapes, solver) in enumerate(self._solvers):
                 apart[:, k] -= (apart[:, k] @ solver.T) @ shapes
         flat = apart.reshape(len(columns), -1)
-        return np.take(flat, self.order, axis=1)
+        return self.vectors(flat, self.violations(columns))
+
+    def vectors(self, flat: Array, violations: Array | float = 0.0) -> Array:
+        """Return residual vectors of flattened samples (n, channels * T) and violations (n, k)."""
+        made = np.empty((len(flat), flat.shape[1] + self.checks))
+        seen, order = self.sampled, self.order
+        np.take(flat, order[:seen], axis=1, out=made[:, :seen])
+        made[:, seen : self.seen] = violations
+        np.take(flat, order[seen:], axis=1, out=made[:, self.seen :])
+        return made
 
     @cached_property
     def _solvers(self) -> list[tuple[Array, Array]]:
@@ -226,14 +244,14 @@ class Problem:
 
     def carried(self, slopes: Array, other: "Problem") -> Array:
         """Return slopes (k, m) in the order of the residuals of a problem with other samples."""
-        flat = np.empty_like(slopes)
-        flat[:, self.order] = slopes
-        return flat[:, other.order]
+        flat = np.array([self.rows(row).ravel() for row in slopes])
+        return other.vectors(flat, slopes[:, self.sampled : self.seen])
 
     def rows(self, residual: Array) -> Array:
-        """Return a residual vector as an array of shape (channels, T)."""
-        out = np.empty(residual.size)
-        out[self.order] = residual
+        """Return the samples of a residual vector as an array of shape (channels, T)."""
+        out, seen = np.empty(self.measured.size), self.sampled
+        out[self.order[:seen]] = residual[:seen]
+        out[self.order[seen:]] = residual[self.seen :]
         return out.reshape(self.measured.shape)
 
 
@@ -244,11 +262,11 @@ def column_of(fit: Fit, z: Array) -> Array:
     return column
 
 
-def _costs(problem: Problem, fit: Fit, tried: Array, columns: Array, residuals: Array) -> Array:
-    """Return the costs of tried coordinates (k, n) with their columns and residuals."""
+def _costs(problem: Problem, fit: Fit, tried: Array, residuals: Array) -> Array:
+    """Return the costs of tried coordinates (k, n) with their residuals."""
     seen = residuals[:, : problem.seen]
     priors = (tried - fit.table.start) ** 2 @ fit.table.precision
-    return np.asarray(np.einsum("ki,ki->k", seen, seen) + priors + problem.penalty(columns))
+    return np.asarray(np.einsum("ki,ki->k", seen, seen) + priors)
 
 
 def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:
@@ -258,7 +276,7 @@ def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:
     for k, fit in enumerate(fits):
         part = slice(k, k + 1)
         fit.residual = found[k].copy()
-        fit.cost = float(_costs(problem, fit, fit.z[None], columns[part], found[part])[0])
+        fit.cost = float(_costs(problem, fit, fit.z[None], found[part])[0])
 
 
 def shifted(fit: Fit, k: int) -> tuple[Array, float]:
@@ -287,7 +305,7 @@ def differentiate(problem: Problem, fits: Sequence[Fit]) -> None:
             fit.slopes = np.zeros((0, len(fit.residual)))
             continue
         fit.slopes = (found[at : at + n] - fit.residual) / np.array(steps[at : at + n])[:, None]
-        fit.fresh = True
+        fit.fresh, fit.age = True, 0
         at += n
 
 
@@ -373,7 +391,7 @@ def improve(
         found = problem.residuals(columns)
         for i, (fit, zs) in enumerate(zip(active, tried, strict=True)):
             part = slice(i * len(zs), (i + 1) * len(zs))
-            costs = _costs(problem, fit, zs, columns[part], found[part])
+            costs = _costs(problem, fit, zs, found[part])
             best = int(np.argmin(costs))
             cost = float(costs[best])
             _step(problem, fit, zs[best], cost, found[part][best], tolerance, renew)
@@ -399,6 +417,8 @@ def _step(
             fit.damping = 1.0
             if own:
                 _secant(problem, fit, step, change)
+                if renew and fit.age >= RENEWED:
+                    fit.slopes = fit.slopes[:0]
             return
     if renew and own and not fresh:
         fit.slopes, fit.damping = fit.slopes[:0], 1.0
@@ -416,3 +436,4 @@ def _secant(problem: Problem, fit: Fit, step: Array, change: Array) -> None:
     if length > 0.0:
         missing = change[: fit.slopes.shape[1]] - step @ fit.slopes
         fit.slopes = fit.slopes + np.outer(weights / length, missing)
+    fit.age += 1
