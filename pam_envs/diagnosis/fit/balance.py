@@ -134,7 +134,8 @@ class Balance:
             matrix = np.vstack([columns * weight[:, None], np.diag(1.0 / spread)])
             target = np.append(self.force * weight, np.zeros(len(low)))
             scale = np.linalg.norm(matrix, axis=0) + 1e-12
-            upper = np.linalg.qr(np.column_stack([matrix / scale, target]), mode="r")
+            whole = np.column_stack([matrix / scale, target])
+            upper = np.asarray(np.linalg.qr(whole, mode="r"))
             solved = lsq_linear(
                 upper[:, :-1], upper[:, -1], (low, np.full(len(low), np.inf)), method="bvls"
             )
