@@ -251,7 +251,7 @@ class MuscleFamily:
         raise unstable
 
 
-FINER = (6, 8, 12, 20, 40)
+FINER = (6, 8, 12, 20, 40, 70, 120)
 """Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
 
 
