@@ -180,6 +180,8 @@ class HysteresisModel:
     kernels: ClassVar[Kernels]
     state_rows: ClassVar[int]
     """Rows of state of one operator."""
+    largest_count: ClassVar[int] = 1
+    """Largest value of the operator's row of ``counts``."""
 
     @property
     def elements(self) -> int:

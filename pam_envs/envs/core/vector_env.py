@@ -20,6 +20,7 @@ from pam_envs.envs.core.setup import (
     for_kernels,
     fresh_seed,
     saved,
+    saved_part,
     space_of,
     tiles_for,
 )
@@ -175,7 +176,8 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         Raises
         ------
         ValueError
-            If an action is not finite or the shape is wrong; nothing has changed then.
+            If the actions are anything but a finite, unmasked array or list of booleans, integers
+            or floats of the shape of ``action_space``; nothing has changed then.
         """
         if not self._seeded:
             raise gym.error.ResetNeeded("call reset() before step()")
@@ -255,12 +257,9 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         ValueError
             If the state is of another kind of batch; nothing has changed then.
         """
-        parts = check_state(state, self.setup.state(tiles_for(self.num_envs), LANES))
-        try:
-            last = np.array(state["last"], np.float32).reshape(self._last_observation.shape)
-            seeded = bool(state["seeded"])
-        except (KeyError, ValueError, TypeError) as error:
-            raise ValueError(f"the state was not made by get_state: {error!r}") from error
+        seeded = bool(saved_part(state, "seeded", (), "b"))
+        parts = check_state(state, self.setup, tiles_for(self.num_envs), LANES, seeded)
+        last = saved_part(state, "last", self._last_observation.shape, "f").astype(np.float32)
         self._all = tuple(map(for_kernels, parts))
         self._last_observation, self._seeded = last, seeded
         self._renderers = []
