@@ -14,7 +14,7 @@ _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother, _SHORT.maxlong = 3, 80, 80, 
 def near(word: str, known: Iterable[str], otherwise: str = "") -> str:
     """Return "; did you mean 'x'?", or the known words, or ``otherwise`` if given."""
     choices = list(known)
-    close = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(word[:_LONGEST], choices, n=1, cutoff=0.6)
     if close:
         return f"; did you mean {close[0]!r}?"
     return otherwise or f"; known: {', '.join(choices)}"
