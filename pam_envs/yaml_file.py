@@ -1,8 +1,8 @@
 """Guarded reader of all YAML files: plants, rigs, scenarios, settings and tables of constants.
 
 Size, depth and the length of a scalar are bounded, and aliases are refused, on the stream of
-events, before anything is built: nested brackets would overflow the stack, and aliases of aliases grow
-exponentially where they are shown. Only plain values are built.
+events, before anything is built: nested brackets would overflow the stack, and aliases of aliases
+grow exponentially where they are shown. Only plain values are built.
 """
 
 from collections.abc import Iterator
@@ -18,6 +18,8 @@ MOST_BYTES = 1_000_000
 MOST_DEPTH = 50
 LONGEST = 20_000
 """Largest number of characters of a scalar."""
+LONGEST_MESSAGE = 2000
+"""Largest number of characters of an error about the content."""
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -80,7 +82,8 @@ def naming(where: str) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        text = str(error)
+        text = printable(str(error))
+        text = text if len(text) <= LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]}..."
         raise type(error)(text if text.startswith(where) else f"{where}: {text}") from error
     except (TypeError, AttributeError, LookupError, ArithmeticError, RecursionError) as error:
         raise ValueError(f"{where}: malformed: {error}") from error

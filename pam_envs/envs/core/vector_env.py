@@ -1,5 +1,6 @@
 """The batch of environments: the same step over rows, in tiles of lanes and over cores."""
 
+import os
 from typing import Any
 
 import gymnasium as gym
@@ -29,6 +30,8 @@ from pam_envs.kernels.random import seed_words
 
 PARALLEL_FROM = 4096
 """Rows from which on a batch is spread over the cores."""
+_THREADS_OF: list[int] = []
+"""Process whose threads run parallel kernels; they do not exist in its forks."""
 
 
 class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
@@ -84,6 +87,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         self._shared = tuple(for_kernels(a) for a in setup.shared)
         self._keys = len(setup.info_keys)
         spread_out = COMPILED and threads != 1 and num_envs >= PARALLEL_FROM
+        self._parallel = spread_out
         self._kernel = setup.kernels.parallel if spread_out else setup.kernels.batch
 
     def reset(
@@ -136,6 +140,10 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
 
     def _call(self, actions: NDArray[Any], outputs: tuple[NDArray[Any], ...], mode: int) -> None:
         if COMPILED:
+            if self._parallel:
+                _THREADS_OF[:] = _THREADS_OF or [os.getpid()]
+                if [os.getpid()] != _THREADS_OF:  # a fork: the same results on one core
+                    self._kernel, self._parallel = self.setup.kernels.batch, False
             self._kernel(*self._all, *self._shared, actions, *outputs, self.num_envs, mode)
             return
         views = [a.tolist() for a in outputs]
