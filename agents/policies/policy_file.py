@@ -171,13 +171,6 @@ def _check_sizes(model: onnx.ModelProto) -> None:
     except Exception as error:
         raise PolicyFileError(f"its shapes do not fit together: {error}") from error
     known = {v.name: v for v in [*inferred.graph.value_info, *inferred.graph.output]}
-    for output in model.graph.output:
-        declared = output.type.tensor_type.shape.dim
-        found = known[output.name].type.tensor_type.shape.dim
-        pairs = zip(declared, found, strict=False)
-        fits = all(a.dim_value == b.dim_value for a, b in pairs if a.dim_value and b.dim_value)
-        if len(declared) != len(found) or not fits:
-            raise PolicyFileError(f"its shapes do not fit together: {shown(output.name)}")
     total = 0
     for node in model.graph.node:
         for name in filter(None, node.output):
@@ -192,6 +185,13 @@ def _check_sizes(model: onnx.ModelProto) -> None:
                     f"or above {MOST_NUMBERS:,} numbers per row, or all values together have more "
                     f"than {MOST_IN_ALL:,}; export a plain feed-forward network"
                 )
+    for output in model.graph.output:
+        declared = output.type.tensor_type.shape.dim
+        found = known[output.name].type.tensor_type.shape.dim
+        pairs = zip(declared, found, strict=False)
+        fits = all(a.dim_value == b.dim_value for a, b in pairs if a.dim_value and b.dim_value)
+        if len(declared) != len(found) or not fits:
+            raise PolicyFileError(f"its shapes do not fit together: {shown(output.name)}")
 
 
 def _card(model: onnx.ModelProto) -> dict[str, Any]:
