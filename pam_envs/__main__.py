@@ -23,6 +23,7 @@ from pam_envs.envs.rendering.scene import view_of
 from pam_envs.export import command as exporting
 from pam_envs.hysteresis.protocol import kinds
 from pam_envs.parameters import Signals
+from pam_envs.wording import printable
 
 if TYPE_CHECKING:
     Kind: TypeAlias = str
@@ -317,9 +318,17 @@ def main(arguments: list[str] | None = None) -> int:
             prog="pam-envs",
             description="Environments for the control of pneumatic artificial muscles.",
         )
-    except (ValueError, OSError, ImportError, RuntimeError) as error:
-        print(f"pam-envs: {error}", file=sys.stderr)
+    except OSError as error:
+        known = error.filename and error.strerror
+        text = f"{error.filename}: {error.strerror}; give another place" if known else str(error)
+        print(f"pam-envs: {printable(text)}", file=sys.stderr)
         return 2
+    except (ValueError, ImportError, RuntimeError) as error:
+        print(f"pam-envs: {printable(str(error))}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("pam-envs: interrupted; nothing was written", file=sys.stderr)
+        return 130
     return 0
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from agents.policies import policy_file as files
 from pam_envs.parameters import Signal, Signals
+from pam_envs.wording import shown
 
 FIELDS = tuple(field.name for field in dataclasses.fields(Signal))
 
@@ -192,7 +193,13 @@ def _session(data: bytes, name: str) -> onnxruntime.InferenceSession:
 
 def _signals(described: Any, name: str) -> Signals:
     try:
-        return Signals(Signal(**entry) for entry in described)
+        made = Signals(Signal(**entry) for entry in described)
+        for signal in made:
+            numbers = np.array([signal.low, signal.high, signal.ahead])
+            text = isinstance(signal.name, str) and isinstance(signal.unit, str)
+            if not text or numbers.dtype.kind not in "iuf" or not np.isfinite(numbers).all():
+                raise ValueError(f"signal {shown(signal.name)}")
+        return made
     except (TypeError, KeyError, ValueError) as error:
         raise files.PolicyFileError(f"{name}: its card describes no signals ({error})") from error
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium as gym
-import yaml
 
-from pam_envs.wording import near
+from pam_envs import yaml_file
+from pam_envs.wording import near, shown
 
 if TYPE_CHECKING:
     from pam_envs.export.model import Model
@@ -67,13 +67,12 @@ def plant_of(what: str) -> Any:
         name, constructor = PLANTS[what]
         return getattr(getattr(plants, name), constructor)()
     path = Path(what)
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as error:
-        raise ValueError(f"plant file {path} cannot be read: {error}") from error
+    data = yaml_file.read(path, "plant file")
     family = data.get("family") if isinstance(data, dict) else None
-    if family not in PLANTS:
-        raise ValueError(f"plant file {path}: family is {family!r}; known: {', '.join(PLANTS)}")
+    if not isinstance(family, str) or family not in PLANTS:
+        raise ValueError(
+            f"plant file {path}: family is {shown(family)}; known: {', '.join(PLANTS)}"
+        )
     return getattr(plants, PLANTS[family][0]).from_yaml(path)
 
 
