@@ -484,6 +484,19 @@ def diagnosis(
     return 0
 
 
+def example(folder: Path | None = None) -> int:
+    """Make the recording with a hidden effect that ships with the package.
+
+    Args:
+        folder: Folder of recording, rig file and sealed truth; default: pam_envs/data.
+    """
+    from benchmarks.diagnosis import example as making
+
+    for path in making.write() if folder is None else making.write(folder):
+        print(path)
+    return 0
+
+
 COMMANDS: dict[str, Callable[..., int]] = {
     "run": run,
     "board": board,
@@ -502,6 +515,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "export": export,
     "show": show,
     "diagnosis": diagnosis,
+    "example": example,
 }
 
 

@@ -2,6 +2,8 @@
 
 import csv
 import dataclasses
+import gzip
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -187,16 +189,20 @@ def column_hint(name: str, known: Iterable[str]) -> str:
 
 
 def _lines(path: Path, where: str) -> list[str]:
+    """Return the lines of a CSV file, which may be compressed with gzip."""
     # utf-8-sig: spreadsheets put a byte order mark before the first column's name.
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        data = path.read_bytes()
+        text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode("utf-8-sig")
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        refuse(where, f"is not a complete gzip file ({error}); compress the CSV again")
     except OSError as error:
         refuse(where, f"cannot be read: {error.strerror or error}")
     except UnicodeDecodeError as error:
         refuse(where, f"is not text in UTF-8 ({error.reason}); save it as CSV in UTF-8")
-    if not lines:
+    if not text:
         refuse(where, "is empty; row 1 must name the columns")
-    return lines
+    return text.splitlines()
 
 
 def _number(cell: str) -> float | None:
