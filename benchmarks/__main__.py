@@ -430,7 +430,7 @@ def show(
 
 
 def diagnosis(
-    chosen: Literal["small", "tune", "final", "worlds"] = "small",
+    chosen: Literal["small", "tune", "final", "worlds", "mutilated"] = "small",
     offset: int = 0,
     kind: tuple[str, ...] = (),
     name: tuple[str, ...] = (),
@@ -447,7 +447,8 @@ def diagnosis(
     """Benchmark the diagnosis on simulated rigs with hidden effects; an interrupted run resumes.
 
     Args:
-        chosen: Set of cases; "worlds" are rigs of ten other simulations.
+        chosen: Set of cases; "worlds" are rigs of ten other simulations, "mutilated" are spoiled
+            recordings.
         offset: Number of the random draw of cases; development on the worlds uses one above 0.
         kind: Only cases of these kinds.
         name: Only cases with one of these hidden effects.
@@ -461,8 +462,10 @@ def diagnosis(
         out: Folder of the page with numbers and figure; default: benchmarks/results for the
             complete final set, otherwise beside the records.
     """
+    from benchmarks.diagnosis import mutilated
     from benchmarks.diagnosis import report as telling
     from benchmarks.diagnosis import run as running
+    from benchmarks.diagnosis.study import study
     from benchmarks.diagnosis.worlds import page as worlds_page
     from benchmarks.speed.diagnosis import timed as reports_timed
     from pam_envs.data.tables import load_contraction_table
@@ -473,7 +476,7 @@ def diagnosis(
         *(chosen, offset, kind, name, loops, next, force, folder, computing, world, each)
     )
     with progress("cases") as start:
-        report = running.run(options, start)
+        report = running.run(options, start, mutilated.study if chosen == "mutilated" else study)
     print(f"{report.computed} computed, {report.found} were there already")
     for line in report.quarantined:
         print(f"corrupt, set aside and computed again: {line}")
@@ -481,11 +484,12 @@ def diagnosis(
         print(f"not made, counted apart: {line}")
     for line in report.failed:
         print(f"FAILED, counted as wrong: {line}", file=sys.stderr)
-    frozen = chosen == "worlds" and offset == 0
+    frozen = chosen in ("worlds", "mutilated") and offset == 0
     official = options.whole and (chosen == "final" or frozen)
     place = out or (rows.RESULTS if official else folder / "pages" / chosen)
-    if chosen == "worlds":
-        for path in worlds_page.write(report.records, place, options.arguments):
+    pages = {"worlds": worlds_page.write, "mutilated": mutilated.write}
+    if chosen in pages:
+        for path in pages[chosen](report.records, place, options.arguments):
             print(path)
         return 0
     beside = {

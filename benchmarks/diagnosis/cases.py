@@ -42,7 +42,7 @@ CAMPAIGNS = {
     "short": hidden.campaign_short,
     "idle": hidden.campaign_idle,
 }
-SETS = {"small": 0, "tune": 1, "final": 2, "worlds": 3}
+SETS = {"small": 0, "tune": 1, "final": 2, "worlds": 3, "mutilated": 4}
 LARGE, WEAK = (1.0, 5.0), (0.1, 1.0)  # ranges of sizes
 LOUDER = 3.0  # relative noise of the ``loud`` cases
 BRIEF = (30.0, 60.0, 120.0)  # durations of the ``brief`` recordings [s]
@@ -93,7 +93,8 @@ class Case:
     @property
     def title(self) -> str:
         """Short description for messages."""
-        parts = [f"{n} {s:.2g}" for n, s in zip(self.names, self.sizes, strict=True)]
+        sizes = [f" {size:.2g}" for size in self.sizes] or [""] * len(self.names)
+        parts = [name + size for name, size in zip(self.names, sizes, strict=True)]
         return f"{self.world} {self.kind} {' + '.join(parts)} seed {self.seed}".replace(
             "  ", " "
         ).strip()

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.diagnosis import mutilated
 from benchmarks.diagnosis.cases import Case, cases
 from benchmarks.diagnosis.sources import HOME
 from benchmarks.diagnosis.study import loops, needs_oracle, promised, study
@@ -128,6 +129,8 @@ def _drawn(options: Options) -> list[Case]:
     """Return the cases of a set."""
     if options.chosen == "worlds":
         return draws.cases(options.offset, options.each)
+    if options.chosen == "mutilated":
+        return mutilated.cases(options.offset)
     if options.each:
         raise ValueError(f"each = {options.each} is for the set worlds; leave it out")
     return cases(options.chosen, options.offset)
