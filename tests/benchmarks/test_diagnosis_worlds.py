@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_fakes import counted, record
 
-from benchmarks.diagnosis.cases import LACKING, Case, Unmade, make
+from benchmarks.diagnosis.cases import LACKING, STRONG, Case, Unmade, make
 from benchmarks.diagnosis.counts import Answer
 from benchmarks.diagnosis.run import Options, select
 from benchmarks.diagnosis.sources import HELD_OUT, TUNED, WORLDS, deserved, draw_rig
@@ -39,7 +39,7 @@ def test_every_world_has_every_effect_four_times_and_fifty_clean_rigs():
     single = Counter((case.world, *case.names) for case in drawn if case.kind == "single")
     assert single == {(world, name): 4 for world in WORLDS for name in EFFECTS}
     kinds = Counter((case.world, case.kind) for case in drawn)
-    number = {"clean": 50, "pair": 10, "triple": 10, "unknown": 6, "clock": 5, "untestable": 5}
+    number = {"clean": 50, "pair": 10, "triple": 10, "unknown": 6, "clock": 5, "untestable": 8}
     assert all(kinds[world, kind] == n for world in WORLDS for kind, n in number.items())
     assert all(1.0 <= size <= 5.0 for case in drawn for size in case.sizes)
     assert all(len(set(c.names)) == 3 == len(c.sizes) for c in drawn if c.kind == "triple")
@@ -109,6 +109,8 @@ def test_effect_that_never_reaches_its_size_is_unmade(monkeypatch):
     monkeypatch.setattr(drawing, "ground_of", _clean_ground)
     with pytest.raises(Unmade, match="too small on all of 12 drawn rigs"):
         make(Case("single", 73, ("creep",), (2.0,), campaign="short", world=WORLDS[0]))
+    made = make(Case("untestable", 73, ("leak",), (2.0,), campaign="short", world=WORLDS[0]))
+    assert made.effects[0][1] == STRONG
 
 
 def test_rig_deserves_a_rate_limit_only_if_it_has_one():
@@ -145,8 +147,12 @@ def test_held_out_worlds_are_counted_apart():
         of_world(OURS, "clean", {}, verdict="adequate"),
         of_world(OURS, "clock", {}, names=["resonance"]),
         of_world(OURS, "clock", {}, names=["static_law"]),
-        of_world(OURS, "untestable", {"leak": 2.0}, names=["supply_droop"]),
-        of_world(OURS, "untestable", {"leak": 2.0}, verdict="ambiguous", names=["supply_droop"]),
+        of_world(OURS, "untestable", {"leak": 2.0}, names=["supply_droop"], truths=[{"raw": 3.0}]),
+        of_world(OURS, "untestable", {"leak": 2.0}, names=["supply_droop"], truths=[{"raw": 0.3}]),
+        of_world(
+            *(OURS, "untestable", {"leak": 2.0}),
+            **{"verdict": "ambiguous", "names": ["supply_droop"], "truths": [{"raw": 3.0}]},
+        ),
         of_world(OURS, "triple", {"creep": 2.0, "leak": 2.0, "slip_step": 2.0}, names=["creep"]),
         {**of_world(THEIRS), "unmade": True, "failure": "Unmade: too small"},
     ]
@@ -156,7 +162,7 @@ def test_held_out_worlds_are_counted_apart():
     assert counted(ours["extra"]) == (0, 2) and counted(theirs["extra"]) == (1, 1)
     assert counted(ours["false_names"]) == (0, 1) and counted(theirs["false_names"]) == (1, 1)
     assert counted(ours["clock_delays"]) == (1, 2)
-    assert counted(ours["untestable"]) == (1, 2)
+    assert counted(ours["untestable"]) == (1, 2) and made["invisible"] == 1
     assert counted(ours["triple"]) == (0, 1)
     assert ours["least_world"]["name"] == OURS
     assert made["unmade"] == {"creep": 1}

@@ -62,6 +62,7 @@ def figures(records: Sequence[Mapping[str, Any]]) -> Numbers:
             name: share(one.wrong for one in _of_kind(answers, "untestable") if name in one.truth)
             for name in sorted({one.truth[0] for one in _of_kind(answers, "untestable")})
         },
+        "invisible": sum(o.kind == "untestable" and not (o.failed or visible(o)) for o in answers),
         "unknown": {
             name: share(one.right for one in _of_kind(answers, "unknown") if name in one.truth)
             for name in sorted({one.truth[0] for one in _of_kind(answers, "unknown")})
@@ -73,10 +74,21 @@ def figures(records: Sequence[Mapping[str, Any]]) -> Numbers:
 
 
 def _of_kind(answers: Sequence[Answer], kind: str) -> list[Answer]:
-    """Return the answers of a kind; ``stick_slip`` is the single effects of that name."""
+    """Return the answers of a kind; ``stick_slip`` is the single effects of that name.
+
+    Untestable effects that are below the noise of their recording before any refit cannot mislead
+    and are left out.
+    """
     if kind == "stick_slip":
         return [one for one in answers if one.kind == "single" and one.truth == (kind,)]
+    if kind == "untestable":
+        return [one for one in answers if one.kind == kind and (one.failed or visible(one))]
     return [one for one in answers if one.kind == kind]
+
+
+def visible(one: Answer) -> bool:
+    """Return whether a hidden effect is above the noise before a refit."""
+    return any(truth["raw"] >= 1.0 for truth in one.record.get("truths", ()))
 
 
 def of_group(answers: Sequence[Answer], worlds: Sequence[str]) -> Numbers:

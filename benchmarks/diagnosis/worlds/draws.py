@@ -17,7 +17,7 @@ from tests.diagnosis.worlds import OUTSIDE
 
 EACH = {
     **{"single": 4, "clean": 50, "pair": 10, "triple": 10},
-    **{"unknown": 6, "clock": 5, "untestable": 5},
+    **{"unknown": 6, "clock": 5, "untestable": 8},
 }
 """Number of cases of a kind in each world; of single effects, for each effect."""
 LATE = (-2.0, -1.0, 0.5, 1.0, 2.0)

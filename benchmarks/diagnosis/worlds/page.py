@@ -132,7 +132,9 @@ def _others(made: Numbers) -> str:
         f"wrong names with a clock offset: {bound_text(every['clock_names'])}; "
         + _named(every["late"]),
         f"pairs with a wrong name: {share_text(every['pair_wrong'])}",
-        "untestable effects, another cause named without doubt: " + _each(made["untestable"]),
+        "untestable effects, another cause named without doubt: "
+        + _each(made["untestable"])
+        + f"; below the noise before any refit and left out: {made['invisible']}",
         "outside the catalogue, `unexplained`: " + _each(made["unknown"]),
         f"{ahead['ambiguous']} ambiguous cases, {ahead['promised']} with a proposed experiment of "
         f"at least one noise variance; resolved {share_text(ahead['resolved'])}",
