@@ -1,4 +1,4 @@
-"""Command line of ``pam-envs``: list, render, identify, diagnose, export, warmup."""
+"""Command line of ``pam-envs``: list, render, identify, diagnose, reveal, export, warmup."""
 
 from __future__ import annotations
 
@@ -191,7 +191,8 @@ def diagnose(
     Parameters
     ----------
     recording : Path
-        CSV file: a recording in time, or a table of settled readings (docs/recording.md).
+        CSV file: a recording in time, or a table of settled readings (docs/recording.md);
+        ``example`` is a shipped recording with a hidden effect.
     rig : Path
         YAML file with the known properties of the rig.
     out : Path
@@ -205,9 +206,13 @@ def diagnose(
     quiet : bool
         Show no progress.
     """
+    from pam_envs.data import example
     from pam_envs.data.recording.recording import Recording, read_input
     from pam_envs.data.rig_file import Rig
 
+    if str(recording) == example.NAME and not recording.exists():
+        recording, shipped = example.recording_and_rig()
+        rig = shipped if rig is None else rig
     declared = Rig() if rig is None else Rig.from_yaml(rig)
     data = read_input(recording, declared)
     if isinstance(data, Recording):
@@ -236,6 +241,20 @@ def diagnose(
         print(f"{report['verdict']}: {report['text']}")
         write(SimpleNamespace(report=report, traces=None, plant=None), out)
     print(f"wrote {out}")
+
+
+def reveal(recording: tyro.conf.Positional[Literal["example"]] = "example") -> None:
+    """Print the effect that is hidden in a shipped recording; diagnose it first.
+
+    Parameters
+    ----------
+    recording : str
+        Name of the recording.
+    """
+    from pam_envs.data import example
+
+    truth = example.reveal()
+    print(f"{', '.join(truth['names'])}: {truth['text']}")
 
 
 def export(
@@ -308,6 +327,7 @@ def main(arguments: list[str] | None = None) -> int:
         "render": render,
         "identify": identify,
         "diagnose": diagnose,
+        "reveal": reveal,
         "export": export,
         "warmup": warmup,
     }

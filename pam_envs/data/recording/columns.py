@@ -2,7 +2,9 @@
 
 import csv
 import dataclasses
+import gzip
 import itertools
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -207,23 +209,26 @@ def column_hint(name: str, known: Iterable[str]) -> str:
 
 
 def _lines(path: Path, where: str) -> list[str]:
+    """Return the lines of a CSV file, which may be compressed with gzip."""
     # utf-8-sig: spreadsheets put a byte order mark before the first column's name.
     try:
-        with path.open("rb") as file:
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
             data = file.read(MOST_BYTES + 1)
         if len(data) > MOST_BYTES:
             refuse(
                 where,
                 f"has more than {MOST_BYTES:,} bytes; average it to 100 Hz, or split it into files",
             )
-        lines = data.decode("utf-8-sig").splitlines()
+        text = data.decode("utf-8-sig")
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        refuse(where, f"is not a complete gzip file ({error}); compress the CSV again")
     except OSError as error:
         refuse(where, f"cannot be read: {error.strerror or error}")
     except UnicodeDecodeError as error:
         refuse(where, f"is not text in UTF-8 ({error.reason}); save it as CSV in UTF-8")
-    if not lines:
+    if not text:
         refuse(where, "is empty; row 1 must name the columns")
-    return lines
+    return text.splitlines()
 
 
 def _number(cell: str) -> float | None:
