@@ -125,10 +125,12 @@ class Ground:
     campaign: hidden.Campaign
     clean: Array  # outputs without effect and noise [m], [Pa], shape (2, T)
     basis: Array  # orthonormal basis of the subspace
-    problem: Problem  # order of the residuals
+    problem: Problem | None  # order of the residuals; None without a basis
 
     def left(self, trace: Array) -> Array:
         """Return the part of a trace (2, T) [m], [Pa] that a refit does not absorb, over noise."""
+        if self.problem is None:
+            return trace / NOISE[:, None]
         whole = self.problem.vectors((trace / NOISE[:, None]).reshape(1, -1))
         return self.problem.rows(projected(whole, self.basis)[0])
 
@@ -190,7 +192,7 @@ def ground_of(case: Case, base: Any, campaign: hidden.Campaign) -> Ground:
     """Fit the plant's flexible base to a recording of a clean rig."""
     clean = outputs_of(base, [], campaign)
     if not case.names:  # nothing whose size is asked
-        return Ground(base, campaign, clean, np.zeros((0, clean.size)), np.arange(clean.size))
+        return Ground(base, campaign, clean, np.zeros((0, clean.size)), None)
     recording, sheet = observed(replace(case, noise=1.0), base, [], campaign, "clean")
     floor = noise_floor(recording, sheet)
     study = Study.begin(recording, sheet, start_plant(sheet), floor)
