@@ -14,7 +14,7 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "3"  # part of every report
+    version: str = "4"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     trial_penalty: float = (
