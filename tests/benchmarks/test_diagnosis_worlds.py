@@ -99,7 +99,7 @@ def _clean_ground(case: Case, base: Any, campaign: Any) -> Any:
     from benchmarks.diagnosis.sources import outputs_of
 
     clean = outputs_of(base, [], campaign)
-    return Ground(base, campaign, clean, np.zeros((0, clean.size)), np.arange(clean.size))
+    return Ground(base, campaign, clean, np.zeros((0, clean.size)), None)
 
 
 def test_effect_that_never_reaches_its_size_is_unmade(monkeypatch):
