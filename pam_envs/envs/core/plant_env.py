@@ -226,11 +226,11 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         ValueError
             If the state is of another kind of environment; nothing has changed then.
         """
+        steps = int(saved_part(state, "steps", (), "i"))
+        digits = saved_part(state, "seed", (np.size(state.get("seed")),), "u")
         try:
-            steps = int(saved_part(state, "steps", (), "i"))
-            digits = saved_part(state, "seed", (np.size(state["seed"]),), "u")
             seed = int(digits.tobytes().decode())
-        except (KeyError, ValueError) as error:
+        except ValueError as error:
             raise ValueError(f"the state was not made by get_state: {shown(error)}") from error
         if not -1 <= steps <= MOST_STEPS or seed < (-1 if steps < 0 else 0):
             raise ValueError(f"the state has steps = {steps} and seed = {shown(seed)}; no run has")

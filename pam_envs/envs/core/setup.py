@@ -286,7 +286,9 @@ def saved_part(state: Any, name: str, shape: tuple[int, ...], kinds: str) -> NDA
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"the state's {name!r} are not numbers: {error}") from error
     if part.dtype.kind not in kinds:
-        raise ValueError(f"the state's {name!r} are of type {part.dtype}, which get_state never is")
+        raise ValueError(
+            f"the state's {name!r} are of type {part.dtype}: it was not made by get_state"
+        )
     if part.shape != shape:
         raise ValueError(
             f"the state's {name!r} has shape {part.shape}, this environment {shape}: it was "
