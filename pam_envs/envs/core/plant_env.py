@@ -227,7 +227,7 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             If the state is of another kind of environment; nothing has changed then.
         """
         steps = int(saved_part(state, "steps", (), "i"))
-        digits = saved_part(state, "seed", (np.size(state.get("seed")),), "u")
+        digits = saved_part(state, "seed", (np.size(state.get("seed", ())),), "u")
         try:
             seed = int(digits.tobytes().decode())
         except ValueError as error:
