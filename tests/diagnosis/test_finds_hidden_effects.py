@@ -30,11 +30,8 @@ SINGLE = [
     Case("single", SEED + k, (name,), (SIZE,))
     for k, name in (
         (1, "creep"),
-        (2, "sensor_delay"),
         (3, "leak"),
         (4, "hysteresis_drive"),
-        (5, "slew_limit"),
-        (6, "valve_dead_band"),
         (8, "stick_slip"),
     )
 ]
