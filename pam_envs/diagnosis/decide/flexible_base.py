@@ -96,7 +96,7 @@ class FlexibleBase:
         begins: list[tuple[Array, int, Mapping[str, float]]]
         begins = [(plain.z, k, {}) for k in range(STARTS)]
         if self.guess:
-            guessed = [inside(f, self.guess.get(f.name, f.start)) for f in plain.frees]
+            guessed = [f.inner(f.within(self.guess.get(f.name, f.start))) for f in plain.frees]
             begins.append((np.array(guessed), 0, self.guess))
         for begin, k, guess in begins:
             frees = tuple(
@@ -111,7 +111,7 @@ class FlexibleBase:
                     ],
                 )
             )
-            z = np.concatenate([begin, [inside(f, f.start) for f in frees]])
+            z = np.concatenate([begin, [f.inner(f.within(f.start)) for f in frees]])
             fits.append(restarted(plain, frees=(*plain.frees, *frees), z=z, shared=None))
         lsq.evaluate(self.problem, fits)
         lsq.improve(self.problem, fits, 2, 1e-4, lsq.FEW_DAMPINGS)
@@ -162,9 +162,3 @@ class FlexibleBase:
         """Return whether the base leaves hardly more than noise on every channel."""
         some = self.blocks.counts.sum(axis=1) > 0
         return bool(np.all(self.blocks.means(self.base.errors)[some] < NOISE_ONLY))
-
-
-def inside(free: lsq.Free, value: float) -> float:
-    """Return the internal coordinate of a starting value, moved into the bounds."""
-    low = max(free.low, 1e-9) if free.log else free.low
-    return free.inner(float(np.clip(value, low, free.high)))

@@ -12,11 +12,11 @@ import numpy as np
 
 from pam_envs.arrays import Array
 from pam_envs.diagnosis.cause import Cause, Form
+from pam_envs.diagnosis.decide.isolability import changes
 from pam_envs.diagnosis.fit import least_squares as lsq
 from pam_envs.diagnosis.fit.candidate import frees_for, initial_fits
 from pam_envs.diagnosis.fit.starting_values import Grid
 
-TOGETHER = 96  # number of columns simulated in one replay
 STARTS_OF_FORM = 2  # largest number of starting points of a form that are fitted
 RIDGE = 1e-9  # relative regularisation of several amounts
 
@@ -84,15 +84,12 @@ class Screen:
         present = {f.name for f in base.frees}
         measure = _Projection.of(problem, base, shared)
         found: list[Prediction] = []
-        pulls, sizes = measure.pulls(self.traces), measure.coupled(self.traces)
+        left = measure.left(self.traces)
         for start in self.starts:
             known = any(t.name in present for t in start.form.terms if t.amount)
             if start.cause.name not in wanted or known:
                 continue
-            pull = pulls[start.rows]
-            traces = self.traces[start.rows]
-            size = traces @ traces.T - sizes(start.rows)
-            gain = _decrease(pull, size, start.both, start.fixed)
+            gain = _decrease(*left(start.rows), start.both, start.fixed)
             found.append((gain, start.cause, start.form, start.values))
         found += self._found_in_residual(problem, family, base, measure, causes)
         return sorted(found, key=lambda p: -p[0])
@@ -116,14 +113,11 @@ class Screen:
             return
         here = lsq.column_of(base, base.z)
         traces = _traces(problem, here, [lsq.column_of(f, f.z) for f in fits])
-        pulls, coupled = measure.pulls(traces), measure.coupled(traces)
+        left = measure.left(traces)
         for k, fit in enumerate(fits):
-            row = slice(k, k + 1)
-            size = traces[row] @ traces[row].T - coupled(row)
             cause, form = fit.label
-            own = fit.frees[len(base.frees) :]
-            values = tuple(free.start for free in own)
-            yield _decrease(pulls[row], size, False, False), cause, form, values
+            values = tuple(free.start for free in fit.frees[len(base.frees) :])
+            yield _decrease(*left(slice(k, k + 1)), False, False), cause, form, values
 
 
 def points_of(form: Form) -> list[Sequence[float]]:
@@ -132,19 +126,17 @@ def points_of(form: Form) -> list[Sequence[float]]:
         return list(form.search.points)
     if form.search is not None:
         return []
-    return [form.start(k) for k in range(max(len(t.starts) for t in form.terms))]
+    return list(form.starts)
 
 
 def _columns(
     family: lsq.PlantFamily, form: Form, values: Sequence[float], here: Array, names: set[str]
 ) -> tuple[list[Array], bool]:
     """Return the columns of a starting point, one for each amount outside a grid."""
-    frees = [f for f in frees_for(family, form, values) if f.name not in names]
-    amounts = [
-        f.place
-        for f, t in zip(frees_for(family, form, values), form.terms, strict=True)
-        if t.amount and f.name not in names
-    ]
+    pairs = zip(frees_for(family, form, values), form.terms, strict=True)
+    own = [(free, term) for free, term in pairs if free.name not in names]
+    frees = [free for free, _ in own]
+    amounts = [free.place for free, term in own if term.amount]
     whole = here.copy()
     for free in frees:
         whole[free.place] = np.clip(free.start, free.low, free.high)
@@ -163,12 +155,8 @@ def _columns(
 
 def _traces(problem: lsq.Problem, here: Array, columns: Sequence[Array]) -> Array:
     """Return the changes of the training residual by parameter columns, shape (n, m)."""
-    plain = problem.residuals(here[None])[0, : problem.seen]
-    made = np.empty((len(columns), problem.seen))
-    for at in range(0, len(columns), TOGETHER):
-        part = slice(at, at + TOGETHER)
-        made[part] = problem.residuals(np.array(columns[part]))[:, : problem.seen] - plain
-    return made
+    none = np.zeros((0, problem.seen))
+    return np.vstack([none, *(t[:, : problem.seen] for t in changes(problem, here, columns))])
 
 
 @dataclass(frozen=True)
@@ -190,16 +178,20 @@ class _Projection:
         gradient = shared.slopes @ residual + (base.z - table.start) * table.precision
         return cls(residual, shared, inverse * np.outer(scale, scale), gradient)
 
-    def pulls(self, traces: Array) -> Array:
-        """Return half the slope of the cost along each trace after a refit, shape (n,)."""
-        across = traces @ self.shared.slopes.T
-        return np.asarray(traces @ self.residual - across @ (self.inverse @ self.gradient))
+    def left(self, traces: Array) -> Callable[[slice], tuple[Array, Array]]:
+        """Return a function from rows of traces to what a refit leaves of them.
 
-    def coupled(self, traces: Array) -> Callable[[slice], Array]:
-        """Return a function to the part of ``traces @ traces.T`` that a refit absorbs."""
+        Half the slopes of the cost along the traces, shape (n,), and their products, (n, n).
+        """
         across = traces @ self.shared.slopes.T
+        pulls = traces @ self.residual - across @ (self.inverse @ self.gradient)
         taken = across @ self.inverse
-        return lambda rows: np.asarray(taken[rows] @ across[rows].T)
+
+        def of(rows: slice) -> tuple[Array, Array]:
+            some = traces[rows]
+            return pulls[rows], some @ some.T - taken[rows] @ across[rows].T
+
+        return of
 
 
 def _decrease(pull: Array, size: Array, both: bool, fixed: bool) -> float:

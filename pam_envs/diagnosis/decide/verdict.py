@@ -252,7 +252,6 @@ def decide(
     rule: Rule,
     seed: int = 0,
     unseen: Sequence[Cause] = (),
-    screen: Screen | None = None,
 ) -> Decision:
     """Search for causes, add further ones while they are accepted, and give the verdict.
 
@@ -266,7 +265,7 @@ def decide(
         [*causes, *unseen],
         regressors,
         rule,
-        screen or Screen.make(problem, family, base.fit, [*causes, *unseen]),
+        Screen.make(problem, family, base.fit, [*causes, *unseen]),
         seed,
         frozenset(cause.name for cause in unseen),
     )

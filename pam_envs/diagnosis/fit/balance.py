@@ -84,9 +84,9 @@ class Balance:
         force = load[rows] * GRAVITY
         return cls(family, rows, path[rows], pressure[rows], force, gaps, path, pressure, noise)
 
-    def solve(self, maps: bool = False, strands: Array | None = None) -> dict[str, float]:
-        """Return coefficients of the static law and play weights, and of map and strands."""
-        return self._solved(maps, strands)[0]
+    def solve(self) -> dict[str, float]:
+        """Return coefficients of the static law and play weights."""
+        return self._solved(False, None)[0]
 
     def flexible(self) -> dict[str, float]:
         """Return coefficients with the map, and with strands if they reduce the error."""

@@ -128,10 +128,7 @@ def regulator(
     limits: list[tuple[Free, ...]] = [()]
     for form in rates:
         if not flows and not any(t.name in known for t in form.terms):
-            limits += [
-                frees_for(family, form, form.start(k))
-                for k in range(max(len(t.starts) for t in form.terms))
-            ]
+            limits += [frees_for(family, form, values) for values in form.starts]
     fits = [Fit.at_start((*order, *limit), family.column) for order in orders for limit in limits]
     only = dataclasses.replace(problem, measured=alone)
     chosen = _simplest(only, blocks, fits)
@@ -190,12 +187,7 @@ def orifices_of(plant: SingleMuscle) -> SingleMuscle:
 
 def start_at_guess(frees: tuple[Free, ...], found: dict[str, float]) -> tuple[Free, ...]:
     """Return free parameters that start at the guess, within their bounds."""
-    made = []
-    for free in frees:
-        if free.name not in found:
-            made.append(free)
-            continue
-        low = max(free.low, 1e-9) if free.log else free.low
-        start = float(np.clip(found[free.name], low, free.high))
-        made.append(dataclasses.replace(free, start=start))
-    return tuple(made)
+    return tuple(
+        dataclasses.replace(f, start=f.within(found[f.name])) if f.name in found else f
+        for f in frees
+    )

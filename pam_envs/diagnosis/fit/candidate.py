@@ -50,8 +50,7 @@ def starting_points(
         if key not in base.begins:
             base.begins[key] = [tuple(s) for s in form.search(problem, family, base, form)]
         return list(base.begins[key])
-    n = max(len(t.starts) for t in form.terms)
-    return [tuple(form.start(i)) for i in range(n)]
+    return form.starts
 
 
 def initial_fits(

@@ -46,6 +46,11 @@ class Free:
         """Return the internal coordinate of a value."""
         return float(np.log(value)) if self.log else value / self.scale
 
+    def within(self, value: float) -> float:
+        """Return a value moved into the bounds, positive on a logarithmic scale."""
+        low = max(self.low, 1e-9) if self.log else self.low
+        return float(np.clip(value, low, self.high))
+
     def outer(self, z: Array) -> Array:
         """Return the values of internal coordinates, clipped to the bounds."""
         raw = np.exp(np.clip(z, -700, 700)) if self.log else z * self.scale
