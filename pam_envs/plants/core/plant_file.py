@@ -18,7 +18,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -26,6 +25,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import yaml
 
 from pam_envs import yaml_file
+from pam_envs.files import write_text
 from pam_envs.hysteresis import protocol
 from pam_envs.parameters import PROVENANCES, Declaration, declarations
 from pam_envs.wording import shown
@@ -114,12 +114,7 @@ def write(plant: Plant, path: Path, notes: Mapping[str, Any] | None = None) -> N
         data["notes"] = dict(notes)
     text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    with open(temporary, "w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(temporary, path)
+    write_text(path, text)
 
 
 def read(cls: type[P], path: Path) -> P:
