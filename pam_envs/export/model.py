@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Model:
-    """An environment or a plant as one state, kernels and named variables.
+    """An environment, a plant or a controller as one state, kernels and named variables.
 
     Attributes
     ----------
@@ -63,8 +63,11 @@ class Model:
         Source of each kernel, by the suffix of its function.
     inputs, outputs, parameters : tuple of Variable
         Outputs in groups: their names begin with the group and a dot.
-    episodic : bool
-        Whether it has seeds and episodes: an environment.
+    kind : {"environment", "plant", "controller"}
+        An environment has seeds and episodes. Inputs of a controller are an observation, its
+        output is an action.
+    agreement : str
+        How its outputs compare with those of the package, for the documentation.
     facts : mapping
         Further lines for the documentation.
     """
@@ -77,8 +80,14 @@ class Model:
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
     parameters: tuple[Variable, ...]
-    episodic: bool
+    kind: Literal["environment", "plant", "controller"]
     facts: Mapping[str, str] = field(default_factory=dict)
+    agreement: str = "equal to those of pam-envs to the last bit"
+
+    @property
+    def episodic(self) -> bool:
+        """Whether it has seeds and episodes."""
+        return self.kind == "environment"
 
     @property
     def prefix(self) -> str:
@@ -124,6 +133,21 @@ class Model:
             "made by": package(),
         }
         return [f"{name}: {text}" for name, text in facts.items()]
+
+
+def signal_variables(signals: Any, block: str, prefix: str = "") -> list[Variable]:
+    """Return the entries of an observation or action in a block, in their order.
+
+    An entry that is scaled to [-1, 1] is a pure number.
+    """
+    found = []
+    for s in signals:
+        unit, low, high, text = str(s.unit), s.low, s.high, ""
+        if s.normalized:
+            text = f"-1 .. 1 for {low:g} .. {high:g}{'' if unit == '1' else f' {unit}'}"
+            unit, low, high = "1", -1.0, 1.0
+        found.append(Variable(f"{prefix}{s.name}", unit, block, s.index, 0.0, low, high, text))
+    return found
 
 
 def identifier(name: str) -> str:
