@@ -5,6 +5,7 @@ and ``tanh`` and ``sigmoid`` come from a series instead of a library, so that an
 that of onnxruntime by some units in the last place.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,10 +30,7 @@ ELEMENTWISE = {
 }  # fmt: skip
 UNARY = {"Tanh": TANH, "Sigmoid": SIGMOID, "Relu": RELU}
 SATURATED = 20.0
-AGREEMENT = (
-    "within 1e-6 of those of onnxruntime, which multiplies matrices in float32, for actions from -1 "
-    "to 1"
-)
+AGREEMENT = "within 1e-6 of those of onnxruntime, which multiplies matrices in float32"
 
 
 @kernel
@@ -218,10 +216,8 @@ def policy_model(name: str, policy: OnnxPolicy, period: float) -> Model:
     program = Program(graph, len(signals), len(actions), policy.memory, corrects)
     inputs = signal_variables(signals, "input")
     if corrects:
-        inputs += [
-            Variable(f"controller.{v.name}", v.unit, "input", len(signals) + v.index, 0.0, v.low, v.high)
-            for v in signal_variables(actions, "input")
-        ]  # fmt: skip
+        given = signal_variables(actions, "input", "controller.")
+        inputs += [replace(v, index=len(signals) + v.index) for v in given]
     arrays = {
         "input": np.zeros(len(inputs)),
         "output": np.zeros(len(actions), np.float32),

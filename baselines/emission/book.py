@@ -126,7 +126,7 @@ def limits_of(signal: Any) -> list[float]:
 
 @kernel
 def read(inputs: Any, columns: Any, data: Any, at: int, k: int, first: int, n: int) -> float:
-    """Return signal ``first + k`` in SI; ``n`` gains and ``n`` offsets are in ``data`` at ``at``."""
+    """Return signal ``first + k`` in SI; its ``n`` gains and offsets are in ``data`` at ``at``."""
     return (inputs[columns[first + k]] - data[at + n + k]) / data[at + k]  # type: ignore[no-any-return]
 
 

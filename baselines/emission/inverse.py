@@ -59,7 +59,7 @@ EXPLAINING = 14
 PER_KILOGRAM = 10.0**LOAD_DIGITS
 AGREEMENT = (
     "equal to those of the Python controller within one unit in the last place of their float32, "
-    "most of them bit for bit (the Python controller takes exp from a library, this one a series)"
+    "most of them bit for bit (the Python controller takes exp from a library)"
 )
 
 
@@ -288,7 +288,9 @@ def inverse_by_address(book: Any, mode: int) -> None:
     numbers[STEPS] = numbers[STEPS] + 1
 
 
-def inverse(controller: Inverse, pid: Gains | None = None, delay: tuple[int, float] = (0, 0.0)) -> Design:
+def inverse(
+    controller: Inverse, pid: Gains | None = None, delay: tuple[int, float] = (0, 0.0)
+) -> Design:
     """Return the design of the inverse, and of the PID beside it.
 
     Raises

@@ -17,7 +17,6 @@ from baselines.emission.book import (
     limits_of,
     read,
     row_sum,
-    scaled,
     write,
 )
 from baselines.emission.pid import N_PID, N_PID_STATE, gains_of, pid_begin, pid_update
@@ -52,8 +51,7 @@ TENSION, ANGLE, SET_POINT, REFERENCE, STANCE, PATH = range(6)
 """Signals, then the previews of the reference and of the reference angle."""
 AGREEMENT = (
     "equal to those of the Python controller within one unit in the last place of their float32, "
-    "most of them bit for bit (the Python controller takes sine and cosine from a library, this one "
-    "a series)"
+    "most of them bit for bit (the Python controller takes sine and cosine from a library)"
 )
 N, M, A, MATRICES = 0, 1, 2, 6
 """Head of a linear system in ``SYSTEMS``: orders of controller and model, sign of the static gain,
@@ -116,7 +114,9 @@ def dot(values: Any, at: int, state: Any, s: int, n: int, work: Any) -> float:
 
 
 @kernel
-def system_output(y: Any, at: int, n: int, d: float, u: float, state: Any, s: int, work: Any) -> float:
+def system_output(
+    y: Any, at: int, n: int, d: float, u: float, state: Any, s: int, work: Any
+) -> float:
     """Return the output of a linear system; ``b`` follows ``a``, ``c`` follows ``b``."""
     return dot(y, at + n * n + n, state, s, n, work) + d * u  # type: ignore[no-any-return]
 
@@ -267,9 +267,7 @@ def knee_by_address(book: Any, mode: int) -> None:
             loop_advance(
                 y, second, path, angle, command - swing, not stance, compensated, state, first, work
             )
-        loop_advance(
-            y, 0, reference, measured, command - own, stance, compensated, state, 0, work
-        )
+        loop_advance(y, 0, reference, measured, command - own, stance, compensated, state, 0, work)
     advance_hysteresis(used, data, breaks, stiffnesses, spring, held)
     write(outputs, 0, command, data, ACTION)
     numbers[STEPS] = numbers[STEPS] + 1

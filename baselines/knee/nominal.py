@@ -200,6 +200,4 @@ class SetPointLimits:
 def set_point_limits(spec: Spec[KneeOrthosis]) -> SetPointLimits:
     """Return the limits of a setpoint that changes no faster than the pressure of the plant can."""
     signal, plant = spec.actions["pressure_set_point"], spec.plant
-    return SetPointLimits(
-        signal.low, signal.high, plant.regulator.slew_rate * plant.control_period
-    )
+    return SetPointLimits(signal.low, signal.high, plant.regulator.slew_rate * plant.control_period)

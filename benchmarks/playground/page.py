@@ -82,7 +82,7 @@ def build() -> str:
     }  # fmt: skip
     texts = {name: (ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS}
     code = "\n".join([INSTANCE, *texts.values()])
-    plain = json.dumps(data, sort_keys=True, separators=(",", ":")).replace("</", "<\\/")
+    plain = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
     page = (ASSETS / "page.html").read_text(encoding="utf-8")
     style = (ASSETS / "page.css").read_text(encoding="utf-8")
     parts = {

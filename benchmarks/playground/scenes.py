@@ -15,7 +15,7 @@ SWEEP = "sweep"
 SWEEP_STEPS = 800
 """Control periods of a rise and a fall."""
 CREEP = 0.02
-"""Creep with which the plants are exported, so that their code has this effect; it can be set to 0."""
+"""Creep with which plants are exported, so that their code has this effect; it can be set to 0."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ SCENES = {
             (
                 Slider("load", "Load", "kg", "load", 0.0, 5.0, 0.05, 2.55),
                 Slider(
-                    "friction", "Friction", "× identified", "hysteresis.friction",
+                    "friction", "Friction", "× identified",  # noqa: RUF001 "hysteresis.friction",
                     0.0, 2.0, 0.05, 1.0, relative=True,
                 ),
                 Slider("creep", "Creep", "%", "muscle.creep_2", 0.0, 30.0, 1.0, 0.0, factor=0.01),
@@ -159,7 +159,7 @@ SCENES = {
                 "inverse": "Inverse, open loop",
                 "pid": "PID",
                 "ppo": "Policy (PPO)",
-                SWEEP: "Pressure sweep, open loop",
+                SWEEP: "Pressure sweep",
             },
             {"reference": "mixed", "load": 2.55, "episode_seconds": 20.0},
             ("output", "reference"),
@@ -176,7 +176,7 @@ SCENES = {
             (
                 Slider("load", "Body mass", "kg", "leg.body_mass", 50.0, 110.0, 0.2, 72.6),
                 Slider(
-                    "friction", "Hysteresis width", "× identified", "hysteresis.width",
+                    "friction", "Hysteresis width", "× identified",  # noqa: RUF001 "hysteresis.width",
                     0.0, 1.2, 0.05, 1.0, relative=True,
                 ),
                 Slider(
@@ -185,10 +185,10 @@ SCENES = {
                 DEAD_TIME,
             ),
             {
-                "knee_inverse_ltr": "Inverse + LTR",
+                "ppo_knee_walk": "Policy (PPO)",
+                "knee_inverse_ahead_ltr": "Inverse + LTR",
                 "knee_inverse": "Inverse, open loop",
                 "knee_pid": "PID",
-                "ppo_knee_walk": "Policy (PPO)",
             },
             {"episode_seconds": 20.0},
             ("output", "reference"),

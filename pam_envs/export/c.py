@@ -16,8 +16,8 @@ _STEP = {
     "controller": "Compute the actions for an observation, once in a control period.",
 }
 SUBJECT = {
-    "environment": "physics, compiled from the same kernels that\nrun in Python",
-    "plant": "physics, compiled from the same kernels that\nrun in Python",
+    "environment": "physics, compiled from the\nkernels that run in Python",
+    "plant": "physics, compiled from the\nkernels that run in Python",
     "controller": "control law",
 }
 """Content of the object code, by kind of model."""
@@ -60,8 +60,8 @@ void {p}_reset({p} *model, uint64_t seed);
 void {p}_next_episode({p} *model);"""
     else:
         what = (
-            "Begin an episode; the outputs are the actions for its first observation, which the first\n"
-            " * step takes again."
+            "Begin an episode; the outputs are the actions for its first observation, which\n"
+            " * the first step takes again."
             if model.kind == "controller"
             else "Bring the plant to rest under its inputs."
         )
@@ -332,7 +332,7 @@ def example(model: Model) -> str:
     begin = "reset(&model, 17);" if model.episodic else "reset(&model, inputs);"
     starts = _wrapped(literal(np.float64(v.start)) for v in model.inputs)
     acts = model.kind == "controller"
-    shown = "each step" if acts else "the start\n * and of each step"
+    shown = "each step" if acts else "the start and of\n * each step"
     return f"""/* Runs {model.title}.
  *
  * example SEED < inputs: a line of inputs is one control period; prints every output of {shown},
@@ -382,15 +382,16 @@ def readme(model: Model) -> str:
     """Return the page of a folder with C."""
     here = host_platform()
     link = f"objects/{here}/{model.name}_kernel.o"
-    changed = f"""Parameters are changed between `{model.prefix}_init` and `{model.prefix}_reset`. pam-envs checks
-their bounds; the C code does not.
+    changed = f"""Parameters are changed between `{model.prefix}_init` and `{model.prefix}_reset`.
+pam-envs checks their bounds; the C code does not.
 
 """
     changed = changed if model.parameters else ""
     return f"""# {model.title} in C
 
 `{model.name}.h` names inputs, outputs and parameters, with units (SI). `{model.name}.c` holds the
-data; `objects/PROCESSOR/{model.name}_kernel.o` the {SUBJECT[model.kind]}. Nothing else is needed: no Python, no libm, no memory allocation.
+data; `objects/PROCESSOR/{model.name}_kernel.o` the {SUBJECT[model.kind]}.
+Nothing else is needed: no Python, no libm, no memory allocation.
 
     cc -O2 example.c {model.name}.c {link} -o example
     ./example 17 1000
@@ -403,8 +404,8 @@ prints every output after 1,000 steps with constant inputs. Outputs are {model.a
 def readme_body(model: Model) -> str:
     """Return facts, inputs, outputs and parameters of a model in Markdown."""
     facts = "\n".join(f"- {line}" for line in model.lines)
-    note = """A parameter changes the plant alone: what an environment derives from its nominal plant stays as
-exported. Parameters of effects that are switched off are left out.
+    note = """A parameter changes the plant alone: what an environment derives from its nominal
+plant stays as exported. Parameters of effects that are switched off are left out.
 
 """
     return f"""{facts}

@@ -122,7 +122,7 @@ class Chart {
     }
     g.textAlign = "center";
     g.textBaseline = "top";
-    for (const value of ticks(...this.x.shown, Math.max(2, (right - left) / 80))) {
+    for (const value of ticks(...this.x.shown, Math.max(2, (right - left) / 64))) {
       const [x] = this.place(value / this.x.scale, 0);
       g.beginPath();
       g.moveTo(Math.round(x) + 0.5, bottom);

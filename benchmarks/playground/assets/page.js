@@ -104,6 +104,7 @@ function show(episode) {
   const shades = about().gate.length ? ungated(episode) : [];
   const [output, reference] = about().error.map((name) => episode.signal(name));
   const loop = LOOPS[scene].y;
+  charts.tracking.x.range = charts.pressure.x.range = [0, time[episode.length - 1]];
   charts.tracking.y = { ...TRACKED[scene] };
   charts.loop.y = { ...loop[1] };
   charts.tracking.show([
@@ -156,7 +157,7 @@ function ungated(episode) {
 
 async function compare(turn) {
   const scored = [];
-  one("measure").textContent = `RMS error [${about().unit}]`;
+  one("measure").textContent = `RMS [${about().unit}]`;
   for (const name of Object.keys(about().controllers)) {
     if (name === "sweep") continue;
     await new Promise((done) => setTimeout(done, 15));
@@ -176,8 +177,8 @@ async function compare(turn) {
       element("td", {}, button), element("td", { class: "number" }, rms.toPrecision(3) + (ended ? " *" : "")),
       element("td", { class: "wide" }, bar));
   }));
-  const gate = about().gate.length ? " in stance (white)" : "";
-  one("note").textContent = `This episode from ${about().settled} s on${gate}.` +
+  const gate = about().gate.length ? ", in stance (not shaded)" : "";
+  one("note").textContent = `In this episode, after ${about().settled} s${gate}.` +
     (scored.some(([, score]) => score.ended) ? " * ended early by a limit." : "");
   document.body.dataset.compared = fragment(page.settings);
 }

@@ -43,13 +43,13 @@ function gauge(g, width, height, pressure, full) {
 function drawMuscle(canvas, episode, row) {
   const { g, width, height } = context(canvas);
   const at = (name) => episode.signal(name)[row], full = episode.scene.full;
-  const x = Math.round(0.46 * width), top = 34, rest = 0.56 * (height - 60);
-  const perMetre = (height - 60) * 0.3 / 0.016, contraction = at("state/contraction");
+  const x = Math.round(0.46 * width), top = 34, rest = 0.57 * height;
+  const perMetre = (0.3 * height) / 0.016, contraction = at("state/contraction");
   const end = top + rest - contraction * perMetre, share = at("state/pressure") / full;
   fill(g, [[x - 60, 16], [x + 60, 16], [x + 60, 24], [x - 60, 24]], ink("--steel"));
   stroke(g, [[x, 24], [x, top]], ink("--steel"), 6);
   const tint = mixed("--cold", "--hot", share), n = 40;
-  const radius = 15 * (1 + 42 * Math.max(0, contraction)), left = [], right = [];
+  const radius = 17 * (1 + 42 * Math.max(0, contraction)), left = [], right = [];
   for (let k = 0; k <= n; k++) {
     const u = k / n, y = top + u * (end - top);
     const r = 9 + (radius - 9) * Math.min(1, 2.2 * Math.sin(Math.PI * u)) ** 0.7;
@@ -109,17 +109,21 @@ function limb(g, a, b, wide, narrow, color) {
 function drawLeg(canvas, episode, row) {
   const { g, width, height } = context(canvas);
   const at = (name) => episode.signal(name)[row], { thigh, shank, arm } = episode.scene.leg;
-  const scale = (height - 90) / (thigh + shank + 0.09), stance = at("state/stance") > 0.5;
-  const knee = [Math.round(0.44 * width), 36 + scale * thigh], off = at("state/deviation");
-  const lower = -at("state/shank") - 0.5 * off, upper = lower + at("state/knee") + off;
-  const hip = along(knee, upper + Math.PI, scale * thigh), ankle = along(knee, lower, scale * shank);
+  const scale = (height - 84) / (thigh + shank + 0.09), stance = at("state/stance") > 0.5;
+  const off = at("state/deviation"), lower = -at("state/shank") - 0.5 * off;
+  const upper = lower + at("state/knee") + off, ground = height - 40;
   const foot = -at("state/shank") + Math.PI / 2 + at("state/ankle");
-  const ground = 36 + scale * (thigh + shank + 0.075);
+  const posed = (hip) => {
+    const knee = along(hip, upper, scale * thigh), ankle = along(knee, lower, scale * shank);
+    const heel = along(ankle, foot - 2.4, 0.085 * scale), toe = along(ankle, foot - 0.32, 0.19 * scale);
+    return { hip, knee, ankle, heel, toe };
+  };
+  let { hip, knee, ankle, heel, toe } = posed([Math.round(0.4 * width), 30]);
+  if (stance) ({ hip, knee, ankle, heel, toe } = posed([hip[0], 30 + ground - Math.max(heel[1], toe[1])]));
   stroke(g, [[16, ground], [width - 50, ground]], ink("--rule"), 2);
   const skin = ink("--skin");
   limb(g, hip, knee, 0.11 * scale, 0.075 * scale, skin);
   limb(g, knee, ankle, 0.075 * scale, 0.045 * scale, skin);
-  const heel = along(ankle, foot - 2.4, 0.085 * scale), toe = along(ankle, foot - 0.32, 0.19 * scale);
   fill(g, [ankle, heel, toe], stance ? ink("--steel") : ink("--rule"));
   stroke(g, [knee, along(knee, lower + off, scale * shank)], ink("--wanted"), 1.6, [5, 4]);
   const middle = 0.5 * (upper + Math.PI + lower), half = 0.5 * at("state/angle");
@@ -139,7 +143,7 @@ function drawLeg(canvas, episode, row) {
     const from = [ankle[0] + scale * at("state/cop"), ground];
     const tip = [from[0] + 0.08 * at("state/ground_force_ahead"), ground - 0.08 * force];
     stroke(g, [from, tip], ink("--third"), 2.5);
-    text(g, `${force.toFixed(0)} N`, tip[0] + 6, Math.max(tip[1], 44), "--third");
+    text(g, `${force.toFixed(0)} N`, tip[0] + 12, Math.max(tip[1], 44), "--third");
   }
   const phase = at("state/phase");
   text(g, `${stance ? "stance" : "swing"}, ${Math.round(100 * phase)} % of the stride`, 16, height - 14, "--ink");
