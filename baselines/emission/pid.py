@@ -34,7 +34,7 @@ READER, ACTION = REACH + 1, REACH + 9
 def pid_update(
     data: Any, at: int, state: Any, s: int, error: float, measured: float, low: float, high: float
 ) -> float:
-    """Return the output of a PID and write its next state (:func:`~baselines.linear.pid.pid_step`)."""
+    """Return the output of a PID and write its next state; see :mod:`baselines.linear.pid`."""
     period = data[at + PERIOD]
     pole = data[at + FILTER] / (data[at + FILTER] + period)
     slope = pole * state[s + 2] + (1.0 - pole) * (measured - state[s + 1]) / period

@@ -132,6 +132,7 @@ def _nominal_knee() -> KneeOrthosis:
 
 
 MODELS = {"maxwell_slip": "Maxwell-slip", "preisach": "Preisach", "none": "none"}
+IDENTIFIED = "× identified"  # noqa: RUF001
 DEAD_TIME = Slider(
     "dead_time", "Dead time", "ms", "regulator.dead_time", 0.0, 110.0, 5.0, 45.0, factor=1e-3
 )
@@ -148,7 +149,7 @@ SCENES = {
             (
                 Slider("load", "Load", "kg", "load", 0.0, 5.0, 0.05, 2.55),
                 Slider(
-                    "friction", "Friction", "× identified",  # noqa: RUF001 "hysteresis.friction",
+                    "friction", "Friction", IDENTIFIED, "hysteresis.friction",
                     0.0, 2.0, 0.05, 1.0, relative=True,
                 ),
                 Slider("creep", "Creep", "%", "muscle.creep_2", 0.0, 30.0, 1.0, 0.0, factor=0.01),
@@ -176,7 +177,7 @@ SCENES = {
             (
                 Slider("load", "Body mass", "kg", "leg.body_mass", 50.0, 110.0, 0.2, 72.6),
                 Slider(
-                    "friction", "Hysteresis width", "× identified",  # noqa: RUF001 "hysteresis.width",
+                    "friction", "Hysteresis width", IDENTIFIED, "hysteresis.width",
                     0.0, 1.2, 0.05, 1.0, relative=True,
                 ),
                 Slider(

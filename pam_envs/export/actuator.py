@@ -3,8 +3,8 @@
     setpoint -> dead time -> regulator -> pressure
     pressure, length -> static law, friction -> tension
 
-Inputs are the setpoint and the muscle's length, held for a step; outputs are pressure and tension at
-its end. The mass belongs to the simulator. The friction's limit is that at the plant's
+Inputs are the setpoint and the muscle's length, held for a step; outputs are pressure and tension
+at its end. The mass belongs to the simulator. The friction's limit is that at the plant's
 load.
 """
 
