@@ -32,9 +32,9 @@ class OnnxPolicy:
     acts together with it: see :class:`agents.policies.residual.ResidualPolicy`.
 
     ``data`` are the bytes of the file. ``memory`` is the width of the state, of a recurrent layer
-    or a history, 0 for none; ``corrects`` the name of the controller that it corrects,
-    empty for none; ``signals`` and ``action_signals`` are those of input and output. The ``card`` has environment, signals,
-    algorithm, steps, seed, versions and command of the training.
+    or a history, 0 for none; ``corrects`` the name of the controller that it corrects, empty for
+    none; ``signals`` and ``action_signals`` are those of input and output. The ``card`` has
+    environment, signals, algorithm, steps, seed, versions and command of the training.
     """
 
     def __init__(self, data: bytes, card: dict[str, Any], name: str = "the policy") -> None:
