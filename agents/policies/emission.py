@@ -15,7 +15,7 @@ from onnx import numpy_helper
 from agents.policies import policy_file as files
 from agents.policies.policy import OnnxPolicy
 from baselines.emission.book import INPUT, NUMBERS, OUTPUT, STATE, STEPS, ControllerKernel
-from pam_envs.export.model import Block, Model, Variable, identifier, signal_variables
+from pam_envs.export.model import Block, Model, identifier, signal_variables
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import array_at, kernel
 
@@ -234,10 +234,7 @@ def policy_model(name: str, policy: OnnxPolicy, period: float) -> Model:
         tuple(Block(k, v, v.shape, k in ("table", "weights")) for k, v in arrays.items()),
         {"kernel": ControllerKernel("policy", policy_by_address, len(arrays))},
         tuple(inputs),
-        tuple(
-            Variable(f"action.{s.name}", "1" if s.normalized else s.unit, "output", s.index)
-            for s in actions
-        ),
+        tuple(signal_variables(actions, "output", "action.")),
         (),
         "controller",
         {"policy": f"{policy.name}, digest {policy.digest()}"},

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pam_envs.arrays import Array
-from pam_envs.export.model import Block, Model, Variable, identifier, signal_variables
+from pam_envs.export.model import Block, Model, identifier, signal_variables
 from pam_envs.kernels.arithmetic import clip
 from pam_envs.kernels.build import kernel
 from pam_envs.kernels.machine_code import AddressKernel
@@ -103,10 +103,7 @@ def model_of(design: Design, name: str, signals: Signals, actions: Signals, peri
         blocks,
         {"kernel": ControllerKernel(design.family, design.function, len(blocks))},
         tuple(signal_variables(signals, "input")),
-        tuple(
-            Variable(f"action.{s.name}", "1" if s.normalized else s.unit, "output", s.index)
-            for s in actions
-        ),
+        tuple(signal_variables(actions, "output", "action.")),
         (),
         "controller",
         {"controller": name},

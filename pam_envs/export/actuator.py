@@ -21,11 +21,13 @@ from pam_envs.kernels.build import array_at, kernel
 from pam_envs.kernels.machine_code import AddressKernel
 from pam_envs.muscle.effective_area import law_and_slope
 from pam_envs.muscle.effects import map_force
-from pam_envs.plants.single_muscle.friction import NO_ELEMENTS, law_numbers
+from pam_envs.plants.single_muscle.friction import law_numbers
 from pam_envs.pneumatics.regulator import regulator_step
 
 NAME = "muscle"
 """Name on the command line."""
+ONE_IDLE = (np.ones(1), np.zeros((1, 2)), 0.0, 1.0)
+"""An element without stiffness, of a muscle without friction (C has no empty arrays)."""
 STEP = 1e-3
 """Usual step [s]: that of multibody simulators."""
 INPUT, OUTPUT, STATE, SLIDERS, NUMBERS, DATA, LAW, THRESHOLDS, CURVES, HISTORY = range(10)
@@ -112,7 +114,7 @@ def muscle_model(plant: Any, step: float = STEP) -> Model:
             "a muscle with imposed length needs a single_muscle without effects, with the "
             "hysteresis maxwell_slip_length, preisach_length or none"
         )
-    elements = NO_ELEMENTS if held.operator is None else held.operator.arrays
+    elements = ONE_IDLE if held.operator is None else held.operator.arrays
     thresholds, curves, low, per = elements
     dead = law.dead_time / step
     whole = math.floor(dead + 1e-9)
@@ -126,7 +128,7 @@ def muscle_model(plant: Any, step: float = STEP) -> Model:
         "input": (np.array([0.0, length]), False),
         "output": (np.zeros(2), False),
         "state": (np.zeros(1), False),
-        "sliders": (np.zeros(len(thresholds) or 1)[: len(thresholds)], False),
+        "sliders": (np.zeros(len(thresholds)), False),
         "numbers": (np.zeros(4, np.int64), False),
         "data": (np.array(numbers), True),
         "law": (law_numbers(plant.muscle), True),

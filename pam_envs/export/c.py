@@ -113,9 +113,7 @@ def _enum(p: str, group: str, variables: Sequence[Variable]) -> str:
     lines = []
     for k, variable in enumerate(variables):
         unit = "" if variable.unit == "1" else f" [{variable.unit}]"
-        span = ""
-        if variable.low is not None:
-            span = f", {variable.low:g} .. {variable.high:g}"
+        span = f", {variable.span}" if variable.span else ""
         start = f", default {variable.start:g}" if group == "parameter" else ""
         lines.append(
             f"    {first}_{variable.word.upper()} = {k}, /* {variable.name}{unit}{span}{start} */"
@@ -421,6 +419,5 @@ def table(title: str, variables: Sequence[Variable]) -> str:
         return ""
     lines = [f"## {title}", "", "| # | name | unit | range |", "|---|---|---|---|"]
     for k, v in enumerate(variables):
-        span = "" if v.low is None else f"{v.low:g} .. {v.high:g}"
-        lines.append(f"| {k} | `{v.name}` | {v.unit} | {span} |")
+        lines.append(f"| {k} | `{v.name}` | {v.unit} | {v.span} |")
     return "\n".join(lines) + "\n"

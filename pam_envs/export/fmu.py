@@ -258,8 +258,8 @@ def _describe(outer: ElementTree.Element, typed: ElementTree.Element, d: Declare
         typed.set("start", "0")
         typed.set("min", "0")
     elif d.kind == "number":
-        if v.text:
-            outer.set("description", v.text)
+        if v.text or v.meant:
+            outer.set("description", v.text or f"-1 .. 1 for {v.meant}")
         typed.set("unit", v.unit)
         if v.low is not None and v.high is not None:
             typed.set("min", repr(float(v.low)))

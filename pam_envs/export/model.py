@@ -28,6 +28,16 @@ class Variable:
     low: float | None = None
     high: float | None = None
     text: str = ""
+    meant: str = ""
+    """Range in SI of an entry that is scaled to -1 .. 1."""
+
+    @property
+    def span(self) -> str:
+        """Range in words, empty if there is none."""
+        if self.low is None:
+            return ""
+        meant = f" for {self.meant}" if self.meant else ""
+        return f"{self.low:g} .. {self.high:g}{meant}"
 
     @property
     def word(self) -> str:
@@ -142,11 +152,12 @@ def signal_variables(signals: Any, block: str, prefix: str = "") -> list[Variabl
     """
     found = []
     for s in signals:
-        unit, low, high, text = str(s.unit), s.low, s.high, ""
+        unit, low, high, meant = str(s.unit), s.low, s.high, ""
         if s.normalized:
-            text = f"-1 .. 1 for {low:g} .. {high:g}{'' if unit == '1' else f' {unit}'}"
+            meant = f"{low:g} .. {high:g}{'' if unit == '1' else f' {unit}'}"
             unit, low, high = "1", -1.0, 1.0
-        found.append(Variable(f"{prefix}{s.name}", unit, block, s.index, 0.0, low, high, text))
+        name = f"{prefix}{s.name}"
+        found.append(Variable(name, unit, block, s.index, 0.0, low, high, meant=meant))
     return found
 
 

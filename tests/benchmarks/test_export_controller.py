@@ -23,7 +23,7 @@ def test_controller_in_si_names_units_and_agreement(tmp_path: Path) -> None:
     assert main(arguments) == 0
     header = (tmp_path / "pid_c" / "pid.h").read_text()
     assert "/* contraction [m], -0.01 .. 0.02 */" in header
-    assert "/* action.pressure_set_point [Pa]" in header
+    assert "/* action.pressure_set_point [Pa], 0 .. 600000 */" in header
     readme = (tmp_path / "pid_c" / "README.md").read_text()
     assert "equal to those of the Python controller to the last bit" in readme
     assert "Parameters" not in readme

@@ -56,7 +56,6 @@ def test_pressure_follows_dead_time_and_lag(tmp_path: Path) -> None:
     plant = SingleMuscle.mas10().replace({"regulator.slew_rate": 1e9})
     inputs = np.column_stack([np.full(400, 1e5), np.full(400, 0.1)])
     model = muscle_model(plant)
-    model.block("input").values[0] = 0.0
     export_c(model, tmp_path, [host_platform()])
     steps = np.vstack([[[0.0, 0.1]], inputs])
     pressure = run_c(model, tmp_path, steps)[2:, 0]
