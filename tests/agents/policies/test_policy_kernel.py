@@ -51,17 +51,22 @@ def test_thousand_actions_in_c_are_those_of_onnxruntime(name: str, tmp_path: Pat
     assert np.ptp(actions) > 0.5
 
 
-def test_reset_begins_an_episode(tmp_path: Path) -> None:
-    name = "residual_knee_tension"  # it has a history
-    policy, inputs, actions = answers(name, 20)
-    first, _ = policy.answer(
-        inputs[10, : len(policy.signals)].astype(np.float32), None, True,
-        inputs[10, len(policy.signals) :].astype(np.float32),
-    )  # fmt: skip
-    model = policy_model(name, policy, 0.01)
-    export_c(model, tmp_path, [host_platform()])
-    assert abs(run_c(model, tmp_path, inputs[10:])[0, 0] - first[0]) <= LARGEST
-    assert abs(first[0] - actions[10, 0]) > 1e-3
+def test_first_step_begins_an_episode(tmp_path: Path) -> None:
+    differences = []
+    for name in ("residual_knee_tension", "residual_knee_stiffness", "residual_elbow"):
+        policy, inputs, actions = answers(name, 40)
+        n = len(policy.signals)
+        late = inputs[10:].astype(np.float32)
+        state, fresh = None, []
+        for row in late:
+            action, state = policy.answer(row[:n], state, None, row[n:])
+            fresh.append(action)
+        model = policy_model(name, policy, 0.01)
+        export_c(model, tmp_path / name, [host_platform()])
+        found = run_c(model, tmp_path / name, inputs[10:])
+        assert np.abs(found - np.array(fresh, float)).max() <= LARGEST
+        differences.append(np.abs(actions[10:] - np.array(fresh, float)).max())
+    assert max(differences) > 1e-3  # the past matters
 
 
 def test_unknown_operation_is_refused() -> None:

@@ -1,16 +1,14 @@
 """Playground: the page in a browser, bit by bit as in Python."""
 
 import base64
-import html
 import json
-import re
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from browser import value_of
 
 from benchmarks.exported import differing
 from benchmarks.playground import page
@@ -77,15 +75,11 @@ def seen(built: str, tmp_path_factory: pytest.TempPathFactory) -> Any:
     driver = f"const JOBS = {json.dumps(jobs)};\nconst PAGE = {inside};\n{DRIVER.read_text()}"
     path = folder / "index.html"
     path.write_text(built.replace("</body>", f"<script>{driver}</script></body>"))
-    command = [
-        *(str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--disable-extensions"),
-        *("--proxy-server=127.0.0.1:9", f"--user-data-dir={folder / 'profile'}"),
-        *("--window-size=1280,900", "--virtual-time-budget=60000", "--dump-dom", path.as_uri()),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=True)
-    found = re.search(r'<pre id="seen">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert found, done.stdout[-2000:]
-    return json.loads(html.unescape(found[1]))
+    text = value_of(
+        str(BROWSER), path.as_uri(), "document.getElementById('seen')?.textContent",
+        folder / "profile", 400.0,
+    )  # fmt: skip
+    return json.loads(text)
 
 
 def outputs_of(run: Any) -> np.ndarray[Any, Any]:
