@@ -370,6 +370,50 @@ def export(steps: int = 1000) -> int:
     return int(any(row.c_bits + row.wasm_bits + row.fmu_bits + row.fmu2_bits for row in rows))
 
 
+def playground(out: Path = Path("exported/playground")) -> int:
+    """Write the playground: environments and controllers in one web page (docs/playground.md).
+
+    Args:
+        out: Folder of index.html.
+    """
+    from benchmarks.playground import page
+
+    path = page.write(out)
+    print(f"wrote {path}, {path.stat().st_size / 1e3:.0f} kB")
+    return 0
+
+
+def export_controller(
+    name: Positional[str],
+    env: str,
+    target: Literal["c", "wasm", "fmu", "st"] = "c",
+    out: Path = Path("exported"),
+    plant: Path | None = None,
+    si: bool = False,
+    training_seed: int | None = None,
+) -> int:
+    """Export a controller or a policy for use without Python (docs/export.md).
+
+    Args:
+        name: Name of the controller, as on the board.
+        env: Id of the environment whose signals it reads.
+        target: "c", "wasm", "fmu", or "st" (Structured Text of IEC 61131-3, for pid and plc_*).
+        out: Folder; the artefact gets a folder in it, by name and target.
+        plant: Plant file of the nominal plant; default: that of the environment.
+        si: Observation and action in SI, not scaled to [-1, 1].
+        training_seed: Training seed of a policy; default: the lowest.
+    """
+    from benchmarks import exported_controller
+    from pam_envs.export import command
+
+    folder = out / f"{name}_{target}"
+    digest = exported_controller.write(
+        name, command.registered(env), target, folder, plant, si, training_seed
+    )
+    print(f"wrote {folder}, digest {digest[:16]}")
+    return 0
+
+
 @dataclass(frozen=True)
 class Arguments:
     """Arguments of an environment; those that are not given have its defaults."""
@@ -531,6 +575,8 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "energy": energy,
     "speed": speed,
     "export": export,
+    "export-controller": export_controller,
+    "playground": playground,
     "show": show,
     "diagnosis": diagnosis,
     "example": example,

@@ -273,7 +273,8 @@ def export(
     Parameters
     ----------
     what : str
-        Id of an environment, with or without PAM/ and -v0; name of a plant; or a plant file.
+        Id of an environment, with or without PAM/ and -v0; name of a plant; a plant file; or
+        "muscle", an actuator with imposed length for multibody simulators.
     target : str
         "c", "wasm", "fmu" (FMI 3.0 and 2.0) or "ptx".
     out : Path

@@ -32,10 +32,10 @@ class OnnxPolicy:
     not depend on the other rows of a batch, to the last bit. A policy that corrects a controller
     acts together with it: see :class:`agents.policies.residual.ResidualPolicy`.
 
-    ``memory`` is the width of the state, of a recurrent layer or a history, 0 for none;
-    ``corrects`` the name of the controller that it corrects, empty for none; ``signals`` and
-    ``action_signals`` are those of input and output. The ``card`` has environment, signals,
-    algorithm, steps, seed, versions and command of the training.
+    ``data`` are the bytes of the file. ``memory`` is the width of the state, of a recurrent layer
+    or a history, 0 for none; ``corrects`` the name of the controller that it corrects, empty for
+    none; ``signals`` and ``action_signals`` are those of input and output. The ``card`` has
+    environment, signals, algorithm, steps, seed, versions and command of the training.
     """
 
     def __init__(self, data: bytes, card: dict[str, Any], name: str = "the policy") -> None:
@@ -44,6 +44,7 @@ class OnnxPolicy:
         self.signals = _signals(card["signals"], name)
         self.action_signals = _signals(card["action_signals"], name)
         self.corrects = _corrects(card, name)
+        self.data = data
         self._digest = hashlib.sha256(data).hexdigest()
         self._session = _session(data, name)
         self.memory = self._check_shapes()

@@ -36,9 +36,14 @@ def model_of(
     si: bool = False,
 ) -> Model:
     """Return the model of an environment or of a plant (arguments as of ``pam-envs export``)."""
+    from pam_envs.export import actuator
     from pam_envs.export.environment import environment_model
     from pam_envs.export.plant import plant_model
 
+    if what == actuator.NAME:
+        if hysteresis or air or reference:
+            raise ValueError("a muscle takes --plant alone; give its hysteresis in the plant file")
+        return actuator.muscle_model(plant_of("single_muscle" if plant is None else str(plant)))
     if what.endswith((".yaml", ".yml")) or what in PLANTS:
         extra = {"plant": plant, "hysteresis": hysteresis, "air": air, "reference": reference}
         for name, value in extra.items():
@@ -85,7 +90,7 @@ def registered(what: str) -> str:
         return found[0] if found else short[what]
     raise ValueError(
         f"no environment or plant named {what!r}{near(what, [*short, *PLANTS])}; plants are: "
-        f"{', '.join(PLANTS)}, or a plant file (.yaml)"
+        f"{', '.join(PLANTS)}, a muscle with imposed length, or a plant file (.yaml)"
     )
 
 
