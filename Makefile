@@ -16,7 +16,7 @@ export SDL_VIDEODRIVER ?= dummy
 
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help venv benchmark test lint format types layers check images wheel clean
+.PHONY: help venv benchmark test lint format types layers check audit images wheel clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
@@ -60,6 +60,10 @@ layers: $(READY) ## Check which way imports run
 	$(BIN)/lint-imports --no-logo
 
 check: lint types layers test ## All of the above checks
+
+audit: $(READY) ## Look up known vulnerabilities of the pinned packages
+	@$(INSTALL) pip-audit
+	$(BIN)/pip-audit --no-deps --disable-pip --requirement constraints.txt
 
 images: $(READY) ## Draw the pictures of the documentation
 	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --reference staircase --load 2.55 --episode-seconds 40 --plot docs/images/muscle_positioning.png

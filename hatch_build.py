@@ -3,8 +3,8 @@
 The links of the README become absolute once ``repository`` is set in pyproject.toml.
 
 ``baselines``, ``agents`` and ``sweeps`` are names that other distributions use, too. The wheel
-holds them as ``pam_envs.baselines`` and so on, with their imports renamed. Pretrained policies
-are not included.
+holds them as ``pam_envs.baselines`` and so on, with their imports and commands (``python -m``)
+renamed. Pretrained policies are not included.
 """
 
 import re
@@ -23,6 +23,7 @@ LEFT_OUT = ("pretrained",)
 NAMES = "|".join(FOLDERS)
 FROM = re.compile(rf"^(\s*from )({NAMES})(?=[.\s])", re.MULTILINE)
 IMPORT = re.compile(rf"^(\s*)import ({NAMES})$", re.MULTILINE)
+COMMAND = re.compile(rf"(?<=python -m )({NAMES})\b")
 LINK = re.compile(r"(!?)\[([^\]]*)\]\((?![a-z]+:|#)([^)\s]+)\)")
 
 
@@ -51,8 +52,10 @@ class CustomMetadataHook(MetadataHookInterface):
 
 
 def renamed(source: str) -> str:
-    """Return Python source whose imports of the folders name them as parts of the package."""
-    return IMPORT.sub(rf"\1from {PACKAGE} import \2", FROM.sub(rf"\1{PACKAGE}.\2", source))
+    """Return Python source whose imports and commands name the folders as parts of the package."""
+    source = FROM.sub(rf"\1{PACKAGE}.\2", source)
+    source = IMPORT.sub(rf"\1from {PACKAGE} import \2", source)
+    return COMMAND.sub(rf"{PACKAGE}.\1", source)
 
 
 class CustomBuildHook(BuildHookInterface):

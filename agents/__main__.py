@@ -50,41 +50,51 @@ def train(
     Args:
         seed: Seed of weights, exploration and episodes; default: 0.
         out: Folder of the run; default: runs/ENV/ALGO-seedSEED.
-        resume: Continue the run in that folder with its settings; only --steps may change.
+        resume: Continue the run in that folder with its settings; only --steps may change. Before
+            its first checkpoint, it starts again with the settings of this command.
         config: YAML file or policy.onnx whose settings replace the preset.
     """
     from agents.training import sweep as sweeping
     from agents.training import train as training
-    from agents.training.record import Run
+    from agents.training.record import CHECKPOINT, Run
 
     console = Console(stderr=True)
     given_env = full_id(env) if env else None
     name, kind, number = given_env or DEFAULT_ENV, algo or "ppo", seed or 0
     preset = f"{kind}-{variant}" if variant else kind
     folder = out or sweeping.folder_of(Path("runs"), name, preset, number)
-    if resume:
-        run = training.saved_run(folder, steps)
-        if config is not None or set:
-            raise SettingsError(
-                "--resume keeps the settings of the run (only --steps may change); leave --config "
-                "and --set out, or start a new run with another --out"
-            )
-        for given, own in ((given_env, run.config.env), (algo, run.config.algo), (seed, run.seed)):
-            if given not in (None, own):
-                raise SettingsError(f"{folder} holds a run of {own}: leave {given} out")
-        if run.checkpoint.exists():
+    _check_counts(seed=(number, 0))
+
+    def fresh() -> Run:
+        settings = _settings(name, kind, variant, config)
+        changes = [*set, *([] if steps is None else [f"steps={steps}"])]
+        return Run(configs.changed(settings, changes), number, folder)
+
+    if not resume:
+        run = fresh()
+        folder.mkdir(parents=True, exist_ok=True)
+    elif not folder.is_dir():
+        training.saved_run(folder)  # raises
+    with training.alone(folder):
+        if resume and not (folder / CHECKPOINT).exists():
+            console.print(f"{folder} has no checkpoint yet: the training starts again")
+            run, resume = fresh(), False
+        if resume:
+            run = training.saved_run(folder, steps)
+            if config is not None or set:
+                raise SettingsError(
+                    "--resume keeps the settings of the run (only --steps may change); leave "
+                    "--config and --set out, or start a new run with another --out"
+                )
+            own = run.config
+            for given, there in ((given_env, own.env), (algo, own.algo), (seed, run.seed)):
+                if given not in (None, there):
+                    raise SettingsError(f"{folder} holds a run of {there}: leave {given} out")
             model = training.resume(run)
             console.print(f"continues at {model.num_timesteps:,} of {run.config.steps:,} steps")
         else:
             model = training.start(run)
-            console.print(f"no checkpoint in {folder} yet: starts again with its settings")
-    else:
-        settings = _settings(name, kind, variant, config)
-        changes = [*set, *([] if steps is None else [f"steps={steps}"])]
-        _check_counts(seed=(number, 0))
-        run = Run(configs.changed(settings, changes), number, folder)
-        model = training.start(run)
-    print(training.train(run, model, console))
+        print(training.train(run, model, console))
 
 
 def _settings(env: str, algo: str, variant: str, file: Path | None) -> configs.Config:

@@ -370,6 +370,50 @@ def export(steps: int = 1000) -> int:
     return int(any(row.c_bits + row.wasm_bits + row.fmu_bits + row.fmu2_bits for row in rows))
 
 
+def playground(out: Path = Path("exported/playground")) -> int:
+    """Write the playground: environments and controllers in one web page (docs/playground.md).
+
+    Args:
+        out: Folder of index.html.
+    """
+    from benchmarks.playground import page
+
+    path = page.write(out)
+    print(f"wrote {path}, {path.stat().st_size / 1e3:.0f} kB")
+    return 0
+
+
+def export_controller(
+    name: Positional[str],
+    env: str,
+    target: Literal["c", "wasm", "fmu", "st"] = "c",
+    out: Path = Path("exported"),
+    plant: Path | None = None,
+    si: bool = False,
+    training_seed: int | None = None,
+) -> int:
+    """Export a controller or a policy for use without Python (docs/export.md).
+
+    Args:
+        name: Name of the controller, as on the board.
+        env: Id of the environment whose signals it reads.
+        target: "c", "wasm", "fmu", or "st" (Structured Text of IEC 61131-3, for pid and plc_*).
+        out: Folder; the artefact gets a folder in it, by name and target.
+        plant: Plant file of the nominal plant; default: that of the environment.
+        si: Observation and action in SI, not scaled to [-1, 1].
+        training_seed: Training seed of a policy; default: the lowest.
+    """
+    from benchmarks import exported_controller
+    from pam_envs.export import command
+
+    folder = out / f"{name}_{target}"
+    digest = exported_controller.write(
+        name, command.registered(env), target, folder, plant, si, training_seed
+    )
+    print(f"wrote {folder}, digest {digest[:16]}")
+    return 0
+
+
 @dataclass(frozen=True)
 class Arguments:
     """Arguments of an environment; those that are not given have its defaults."""
@@ -430,10 +474,12 @@ def show(
 
 
 def diagnosis(
-    chosen: Literal["small", "tune", "final"] = "small",
+    chosen: Literal["small", "tune", "final", "worlds", "mutilated"] = "small",
     offset: int = 0,
     kind: tuple[str, ...] = (),
     name: tuple[str, ...] = (),
+    world: tuple[str, ...] = (),
+    each: int = 0,
     loops: int = 0,
     next: bool = False,
     force: bool = False,
@@ -445,10 +491,13 @@ def diagnosis(
     """Benchmark the diagnosis on simulated rigs with hidden effects; an interrupted run resumes.
 
     Args:
-        chosen: Set of cases.
-        offset: Number of the random draw of cases.
+        chosen: Set of cases; "worlds" are rigs of ten other simulations, "mutilated" are spoiled
+            recordings.
+        offset: Number of the random draw of cases; development on the worlds uses one above 0.
         kind: Only cases of these kinds.
         name: Only cases with one of these hidden effects.
+        world: Only rigs of these worlds.
+        each: Only so many cases of every kind in each world.
         loops: Number of cases per cause that are run in closed loop on the hidden rig.
         next: Run the proposed experiments.
         force: Compute stored cases again.
@@ -457,29 +506,55 @@ def diagnosis(
         out: Folder of the page with numbers and figure; default: benchmarks/results for the
             complete final set, otherwise beside the records.
     """
+    from benchmarks.diagnosis import mutilated
     from benchmarks.diagnosis import report as telling
     from benchmarks.diagnosis import run as running
+    from benchmarks.diagnosis.study import study
+    from benchmarks.diagnosis.worlds import page as worlds_page
     from benchmarks.speed.diagnosis import timed as reports_timed
     from pam_envs.data.tables import load_contraction_table
     from pam_envs.diagnosis.static.diagnosis import diagnose_readings
 
     folder = running.FOLDER if cells is None else cells
-    options = running.Options(chosen, offset, kind, name, loops, next, force, folder, computing)
+    options = running.Options(
+        *(chosen, offset, kind, name, loops, next, force, folder, computing, world, each)
+    )
     with progress("cases") as start:
-        report = running.run(options, start)
+        report = running.run(options, start, mutilated.study if chosen == "mutilated" else study)
     print(f"{report.computed} computed, {report.found} were there already")
     for line in report.quarantined:
         print(f"corrupt, set aside and computed again: {line}")
+    for line in report.unmade:
+        print(f"not made, counted apart: {line}")
     for line in report.failed:
         print(f"FAILED, counted as wrong: {line}", file=sys.stderr)
-    official = chosen == "final" and options.whole
+    frozen = chosen in ("worlds", "mutilated") and offset == 0
+    official = options.whole and (chosen == "final" or frozen)
     place = out or (rows.RESULTS if official else folder / "pages" / chosen)
+    pages = {"worlds": worlds_page.write, "mutilated": mutilated.write}
+    if chosen in pages:
+        for path in pages[chosen](report.records, place, options.arguments):
+            print(path)
+        return 0
     beside = {
         "tables": diagnose_readings(load_contraction_table()),
         "whole_report_s": reports_timed()[1] if timed else (),
     }
     arguments = options.arguments + " --timed" * timed
     for path in telling.write(report.records, place, arguments, **beside):
+        print(path)
+    return 0
+
+
+def example(folder: Path | None = None) -> int:
+    """Make the recording with a hidden effect that ships with the package.
+
+    Args:
+        folder: Folder of recording, rig file and sealed truth; default: pam_envs/data.
+    """
+    from benchmarks.diagnosis import example as making
+
+    for path in making.write() if folder is None else making.write(folder):
         print(path)
     return 0
 
@@ -500,8 +575,11 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "energy": energy,
     "speed": speed,
     "export": export,
+    "export-controller": export_controller,
+    "playground": playground,
     "show": show,
     "diagnosis": diagnosis,
+    "example": example,
 }
 
 

@@ -1,4 +1,4 @@
-"""Command line of ``pam-envs``: list, render, identify, diagnose, export, warmup, doctor."""
+"""Command line of ``pam-envs``; ``pam-envs --help`` lists the commands."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ from pam_envs.envs.registration import full_id, register_all
 from pam_envs.envs.rendering import film
 from pam_envs.envs.rendering.scene import view_of
 from pam_envs.export import command as exporting
+from pam_envs.files import write_text
 from pam_envs.hysteresis.protocol import kinds
 from pam_envs.parameters import Signals
-from pam_envs.wording import package
+from pam_envs.wording import package, printable
 
 if TYPE_CHECKING:
     Kind: TypeAlias = str
@@ -143,8 +144,7 @@ def identify(out: Path = Path("identified"), members: int = 8) -> None:
 
     out.mkdir(parents=True, exist_ok=True)
     report = identify_all(out, members, lambda line: print(line, flush=True))
-    with film.whole_file(out / "identification.md") as path:
-        path.write_text(report, encoding="utf-8")
+    write_text(out / "identification.md", report)
     print(report)
 
 
@@ -162,7 +162,8 @@ def diagnose(
     Parameters
     ----------
     recording : Path
-        CSV file: a recording in time, or a table of settled readings (docs/recording.md).
+        CSV file: a recording in time, or a table of settled readings (docs/recording.md);
+        ``example`` is a shipped recording with a hidden effect.
     rig : Path
         YAML file with the known properties of the rig.
     out : Path
@@ -176,9 +177,13 @@ def diagnose(
     quiet : bool
         Show no progress.
     """
+    from pam_envs.data import example
     from pam_envs.data.recording.recording import Recording, read_input
     from pam_envs.data.rig_file import Rig
 
+    if str(recording) == example.NAME and not recording.exists():
+        recording, shipped = example.recording_and_rig()
+        rig = shipped if rig is None else rig
     declared = Rig() if rig is None else Rig.from_yaml(rig)
     data = read_input(recording, declared)
     if isinstance(data, Recording):
@@ -209,6 +214,20 @@ def diagnose(
     print(f"wrote {out}")
 
 
+def reveal(recording: tyro.conf.Positional[Literal["example"]] = "example") -> None:
+    """Print the effect that is hidden in a shipped recording; diagnose it first.
+
+    Parameters
+    ----------
+    recording : str
+        Name of the recording.
+    """
+    from pam_envs.data import example
+
+    truth = example.reveal()
+    print(f"{', '.join(truth['names'])}: {truth['text']}")
+
+
 def export(
     what: tyro.conf.Positional[str],
     target: exporting.Format = "c",
@@ -225,7 +244,8 @@ def export(
     Parameters
     ----------
     what : str
-        Id of an environment, with or without PAM/ and -v0; name of a plant; or a plant file.
+        Id of an environment, with or without PAM/ and -v0; name of a plant; a plant file; or
+        "muscle", an actuator with imposed length for multibody simulators.
     target : str
         "c", "wasm", "fmu" (FMI 3.0 and 2.0) or "ptx".
     out : Path
@@ -279,6 +299,7 @@ def main(arguments: list[str] | None = None) -> int:
         "render": render,
         "identify": identify,
         "diagnose": diagnose,
+        "reveal": reveal,
         "export": export,
         "warmup": warmup,
         "doctor": doctor,
@@ -294,9 +315,17 @@ def main(arguments: list[str] | None = None) -> int:
             description="Environments for the control of pneumatic artificial muscles. "
             "--version prints the version.",
         )
-    except (ValueError, OSError, ImportError, RuntimeError) as error:
-        print(f"pam-envs: {error}", file=sys.stderr)
+    except OSError as error:
+        known = error.filename and error.strerror
+        text = f"{error.filename}: {error.strerror}; give another place" if known else str(error)
+        print(f"pam-envs: {printable(text)}", file=sys.stderr)
         return 2
+    except (ValueError, ImportError, RuntimeError) as error:
+        print(f"pam-envs: {printable(str(error))}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("pam-envs: interrupted; nothing was written", file=sys.stderr)
+        return 130
     return int(status or 0)
 
 

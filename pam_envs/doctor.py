@@ -20,7 +20,7 @@ from pam_envs.wording import package
 
 ENVIRONMENT = "PAM/MusclePositioning-v0"
 CORE = ("numpy", "scipy", "numba", "llvmlite", "gymnasium")
-USER_EXTRAS = ("plot", "baselines", "agents", "export")
+USER_EXTRAS = ("plot", "data", "baselines", "agents", "export", "rig")
 REQUIREMENT = re.compile(r"([\w.-]+)[^;]*;.*extra == ['\"](\w+)['\"]")
 STEPS = 5  # compared between plain Python and machine code
 
@@ -141,7 +141,8 @@ def doctor() -> int:
     for finding in examine():
         faults += not finding.ok
         print(f"{'ok   ' if finding.ok else 'FAULT'}  {finding.topic:12}  {finding.text}")
-    print(f"{faults} faults" if faults else "no faults", file=sys.stderr if faults else sys.stdout)
+    total = f"{faults} fault{'s' * (faults > 1)}" if faults else "no faults"
+    print(total, file=sys.stderr if faults else sys.stdout)
     return 1 if faults else 0
 
 

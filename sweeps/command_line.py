@@ -26,5 +26,6 @@ def run_cli(command: Callable[[], int | None], interrupted: str) -> int:
 
 
 def _fail(message: str, status: int) -> int:
-    print(message, file=sys.stderr)
+    escaped = (c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in message)
+    print("".join(escaped), file=sys.stderr)
     return status

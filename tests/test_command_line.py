@@ -44,7 +44,7 @@ def test_doctor_names_the_remedy_of_a_cache_that_cannot_be_written(
     printed = capsys.readouterr()
     assert "FAULT  cache" in printed.out
     assert "set PAM_ENVS_CACHE to a folder that can be written" in printed.out
-    assert printed.err == "1 faults\n"
+    assert printed.err == "1 fault\n"
 
 
 @pytest.mark.skipif(not COMPILED, reason="there is no machine code")

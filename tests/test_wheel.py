@@ -70,6 +70,9 @@ def test_wheel_has_every_module_and_settings_file(installed):
         for file in (ROOT / folder).rglob("*"):
             if file.suffix in (".py", ".yaml"):
                 assert (installed / "pam_envs" / file.relative_to(ROOT)).is_file(), file
+    for file in (ROOT / "pam_envs").rglob("*"):
+        if file.is_file() and file.suffix != ".pyc":
+            assert (installed / file.relative_to(ROOT)).is_file(), file
 
 
 def test_modules_of_the_wheel_import_no_name_of_the_checkout(installed):
@@ -79,6 +82,13 @@ def test_modules_of_the_wheel_import_no_name_of_the_checkout(installed):
             if isinstance(node, ast.ImportFrom) and not node.level:
                 names = [node.module or ""]
             assert not {name.partition(".")[0] for name in names} & FOLDERS, file
+
+
+def test_commands_in_the_wheel_name_its_modules(installed):
+    command = re.compile(rf"python -m ({'|'.join(FOLDERS)})\b")
+    texts = {file: file.read_text(encoding="utf-8") for file in installed.rglob("*.py")}
+    assert [file for file, text in texts.items() if command.search(text)] == []
+    assert "python -m pam_envs.agents" in texts[installed / "pam_envs/agents/__main__.py"]
 
 
 def test_snippets_of_the_readme_run_from_the_wheel(installed, tmp_path):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from agents.policies import policy_file as files
 from pam_envs.parameters import Signal, Signals
+from pam_envs.wording import shown
 
 FIELDS = tuple(field.name for field in dataclasses.fields(Signal))
 
@@ -31,10 +32,10 @@ class OnnxPolicy:
     not depend on the other rows of a batch, to the last bit. A policy that corrects a controller
     acts together with it: see :class:`agents.policies.residual.ResidualPolicy`.
 
-    ``memory`` is the width of the state, of a recurrent layer or a history, 0 for none;
-    ``corrects`` the name of the controller that it corrects, empty for none; ``signals`` and
-    ``action_signals`` are those of input and output. The ``card`` has environment, signals,
-    algorithm, steps, seed, versions and command of the training.
+    ``data`` are the bytes of the file. ``memory`` is the width of the state, of a recurrent layer
+    or a history, 0 for none; ``corrects`` the name of the controller that it corrects, empty for
+    none; ``signals`` and ``action_signals`` are those of input and output. The ``card`` has
+    environment, signals, algorithm, steps, seed, versions and command of the training.
     """
 
     def __init__(self, data: bytes, card: dict[str, Any], name: str = "the policy") -> None:
@@ -43,6 +44,7 @@ class OnnxPolicy:
         self.signals = _signals(card["signals"], name)
         self.action_signals = _signals(card["action_signals"], name)
         self.corrects = _corrects(card, name)
+        self.data = data
         self._digest = hashlib.sha256(data).hexdigest()
         self._session = _session(data, name)
         self.memory = self._check_shapes()
@@ -192,7 +194,13 @@ def _session(data: bytes, name: str) -> onnxruntime.InferenceSession:
 
 def _signals(described: Any, name: str) -> Signals:
     try:
-        return Signals(Signal(**entry) for entry in described)
+        made = Signals(Signal(**entry) for entry in described)
+        for signal in made:
+            numbers = np.array([signal.low, signal.high, signal.ahead])
+            text = isinstance(signal.name, str) and isinstance(signal.unit, str)
+            if not text or numbers.dtype.kind not in "iuf" or not np.isfinite(numbers).all():
+                raise ValueError(f"signal {shown(signal.name)}")
+        return made
     except (TypeError, KeyError, ValueError) as error:
         raise files.PolicyFileError(f"{name}: its card describes no signals ({error})") from error
 

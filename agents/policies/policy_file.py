@@ -15,11 +15,14 @@ from typing import Any
 import onnx
 import onnx.shape_inference
 
+from pam_envs.wording import shown
 from sweeps.files import write_bytes
 
 POLICY, RECORD = "policy.onnx", "policy.json"  # files of a finished run
 MOST_BYTES = 5_000_000
-MOST_NUMBERS = 100_000
+MOST_NODES = 500
+MOST_NUMBERS, MOST_IN_ALL = 100_000, 1_000_000
+"""Largest numbers per row of one value, and of all values together."""
 CARD = "pam_policy"
 SCHEMA = 1
 INPUT, OUTPUT = "observation", "action"
@@ -137,6 +140,10 @@ def check_graph(model: onnx.ModelProto) -> None:
                 raise PolicyFileError(f"{node.op_type} has a graph inside; policies do not loop")
             _check_tensors([attribute.t, *attribute.tensors])
     _check_tensors(model.graph.initializer)
+    if len(model.graph.node) > MOST_NODES:
+        raise PolicyFileError(
+            f"has {len(model.graph.node):,} operators; at most {MOST_NODES} are run"
+        )
     _check_sizes(model)
 
 
@@ -150,21 +157,41 @@ def _check_tensors(tensors: Any) -> None:
 
 
 def _check_sizes(model: onnx.ModelProto) -> None:
-    """Refuse values of unknown or large size, apart from the batch axis."""
+    """Refuse values of unknown or large size, apart from the batch axis.
+
+    Sizes that the file declares of its own values are not believed.
+    """
+    bare = onnx.ModelProto()
+    bare.CopyFrom(model)
+    del bare.graph.value_info[:]
+    for output in bare.graph.output:
+        output.type.tensor_type.ClearField("shape")
     try:
-        inferred = onnx.shape_inference.infer_shapes(model, check_type=True, strict_mode=True)
+        inferred = onnx.shape_inference.infer_shapes(bare, check_type=True, strict_mode=True)
     except Exception as error:
         raise PolicyFileError(f"its shapes do not fit together: {error}") from error
     known = {v.name: v for v in [*inferred.graph.value_info, *inferred.graph.output]}
+    total = 0
     for node in model.graph.node:
-        for name in node.output:
-            dims = known[name].type.tensor_type.shape.dim if name in known else None
+        for name in filter(None, node.output):
+            kind = known[name].type.tensor_type if name in known else None
+            dims = kind.shape.dim if kind is not None and kind.HasField("shape") else None
             sizes = [d.dim_value for d in dims or () if d.HasField("dim_value")]
-            if dims is None or len(dims) - len(sizes) > 1 or math.prod(sizes) > MOST_NUMBERS:
+            total += math.prod(sizes)
+            large = math.prod(sizes) > MOST_NUMBERS or total > MOST_IN_ALL
+            if dims is None or len(dims) - len(sizes) > 1 or large:
                 raise PolicyFileError(
-                    f"the size of {name!r} (operator {node.op_type}) is not known in advance or "
-                    f"above {MOST_NUMBERS:,} numbers per row; export a plain feed-forward network"
+                    f"the size of {shown(name)} (operator {node.op_type}) is not known in advance "
+                    f"or above {MOST_NUMBERS:,} numbers per row, or all values together have more "
+                    f"than {MOST_IN_ALL:,}; export a plain feed-forward network"
                 )
+    for output in model.graph.output:
+        declared = output.type.tensor_type.shape.dim
+        found = known[output.name].type.tensor_type.shape.dim
+        pairs = zip(declared, found, strict=False)
+        fits = all(a.dim_value == b.dim_value for a, b in pairs if a.dim_value and b.dim_value)
+        if len(declared) != len(found) or not fits:
+            raise PolicyFileError(f"its shapes do not fit together: {shown(output.name)}")
 
 
 def _card(model: onnx.ModelProto) -> dict[str, Any]:

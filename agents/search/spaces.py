@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
 from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
 from agents.settings.presets import Config, from_mapping, put
+from pam_envs import yaml_file
 
 Distribution = FloatDistribution | IntDistribution | CategoricalDistribution
 Space = Mapping[str, Distribution]
@@ -94,7 +94,7 @@ def as_settings(config: Config, values: Mapping[str, Any]) -> dict[str, Any]:
             made[f"{config.algo}.learning_rate"] = [_short(value), _short(share * _short(value))]
         else:
             place = name if "." in name else f"{config.algo}.{name}"
-            made[place] = yaml.safe_load(value) if isinstance(value, str) else _short(value)
+            made[place] = yaml_file.parse(value, place) if isinstance(value, str) else _short(value)
     return made
 
 

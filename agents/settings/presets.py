@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import yaml
 
 import pam_envs  # noqa: F401  (registers the environments)
 from agents.settings import parts
 from agents.settings.parts import Evaluation, History, Network, Normalize, Plants, Residual, Search
 from agents.settings.schema import SettingsError, build, choice, number
+from pam_envs import yaml_file
 from pam_envs.wording import near
 
 FOLDER = Path(__file__).resolve().parents[1] / "configs"
@@ -192,22 +192,20 @@ def read(path: str | Path) -> Config:
     """Return the configuration in a YAML file; a SettingsError names what is wrong in it."""
     path = Path(path)
     given = _mapping(path)
-    try:
+    with yaml_file.naming(path.name):
         return from_mapping(given)
-    except SettingsError as error:
-        raise SettingsError(f"{path.name}: {error}") from error
 
 
 def _mapping(path: Path) -> Any:
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        raise SettingsError(f"{path.name} cannot be read as YAML: {error}") from error
+        return yaml_file.read(path, "settings")
+    except ValueError as error:
+        raise SettingsError(str(error)) from error
 
 
 def from_text(text: str) -> Config:
     """Return the configuration of a YAML text; see :func:`read`."""
-    return from_mapping(yaml.safe_load(text))
+    return from_mapping(yaml_file.parse(text, "the settings"))
 
 
 def from_mapping(given: Any) -> Config:
@@ -259,7 +257,7 @@ def changed(config: Config, assignments: Sequence[str]) -> Config:
         name, equals, text = assignment.partition("=")
         if not equals:
             raise SettingsError(f"{assignment!r} must read name=value, for example ppo.gamma=0.95")
-        put(plain, name, yaml.safe_load(text))
+        put(plain, name, yaml_file.parse(text, name))
     return from_mapping(plain)
 
 

@@ -4,10 +4,10 @@ import dataclasses
 import math
 import types
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from pam_envs.wording import near
+from pam_envs import yaml_file
+from pam_envs.wording import near, shown
 
 
 class SettingsError(ValueError):
@@ -31,14 +31,14 @@ def build(cls: type, given: Any, where: str = "") -> Any:
     messages. A SettingsError names the entry, its value and the remedy.
     """
     if not isinstance(given, Mapping):
-        raise SettingsError(f"{where or 'the settings'} must be a mapping, got {given!r}")
+        raise SettingsError(f"{where or 'the settings'} must be a mapping, got {shown(given)}")
     fields = {field.name: field for field in dataclasses.fields(cls)}
     hints = get_type_hints(cls)
     values = {}
     for key, value in given.items():
         place = f"{where}.{key}" if where else str(key)
         if key not in fields:
-            raise SettingsError(f"unknown setting {place!r}{near(str(key), list(fields))}")
+            raise SettingsError(f"unknown setting {shown(place)}{near(str(key), list(fields))}")
         values[key] = _value(hints[key], value, place)
         _check_field(fields[key], values[key], place)
     missing = [
@@ -66,14 +66,14 @@ def _value(kind: Any, value: Any, place: str) -> Any:
         return _known(value, get_args(kind), place)
     if origin in (dict, Mapping):
         if not isinstance(value, Mapping) or not all(isinstance(k, str) for k in value):
-            raise SettingsError(f"{place} = {value!r} must be a mapping from names to values")
+            raise SettingsError(f"{place} = {shown(value)} must be a mapping from names to values")
         return dict(value)
     return _plain(kind, value, place)
 
 
 def _known(value: Any, known: Sequence[str], place: str) -> Any:
     if value not in known:
-        raise SettingsError(f"{place} = {value!r} is not known{near(str(value), [*known])}")
+        raise SettingsError(f"{place} = {shown(value)} is not known{near(str(value), [*known])}")
     return value
 
 
@@ -87,14 +87,14 @@ def _one_of(kinds: tuple[Any, ...], value: Any, place: str) -> Any:
                 return _value(kind, value, place)
             except SettingsError as refused:
                 error = error or refused
-    raise error or SettingsError(f"{place} = {value!r} has an unknown type")
+    raise error or SettingsError(f"{place} = {shown(value)} has an unknown type")
 
 
 def _several(kinds: tuple[Any, ...], value: Any, place: str) -> tuple[Any, ...]:
     if not isinstance(value, (list, tuple)):
-        raise SettingsError(f"{place} = {value!r} must be a list")
+        raise SettingsError(f"{place} = {shown(value)} must be a list")
     if kinds[-1] is not Ellipsis and len(value) != len(kinds):
-        raise SettingsError(f"{place} = {value!r} must have {len(kinds)} entries")
+        raise SettingsError(f"{place} = {shown(value)} must have {len(kinds)} entries")
     return tuple(_value(kinds[0], entry, f"{place}[{i}]") for i, entry in enumerate(value))
 
 
@@ -103,16 +103,13 @@ def _plain(kind: Any, value: Any, place: str) -> Any:
         return value
     if kind is int and isinstance(value, int) and not isinstance(value, bool):
         return value
-    if kind is float and isinstance(value, str):  # YAML 1.1 reads 1e-3 as text
-        with suppress(ValueError):
-            value = float(value)
-    numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if kind is float and numeric and math.isfinite(value):
-        return float(value)
+    number = yaml_file.number(value) if kind is float else None
+    if number is not None and math.isfinite(number):
+        return number
     if kind is str and isinstance(value, str):
         return value
     names = {bool: "true or false", int: "a whole number", float: "a finite number", str: "text"}
-    raise SettingsError(f"{place} = {value!r} must be {names.get(kind, kind)}")
+    raise SettingsError(f"{place} = {shown(value)} must be {names.get(kind, kind)}")
 
 
 def _check_field(field: dataclasses.Field[Any], value: Any, place: str) -> None:
@@ -123,4 +120,4 @@ def _check_field(field: dataclasses.Field[Any], value: Any, place: str) -> None:
     low, high = field.metadata["bounds"]
     for one in value if isinstance(value, tuple) else (value,):
         if not low <= one <= high:
-            raise SettingsError(f"{place} = {one!r} must be from {low:g} to {high:g}")
+            raise SettingsError(f"{place} = {shown(one)} must be from {low:g} to {high:g}")

@@ -30,7 +30,7 @@ def sweep(folder: Path) -> None:
 def save(path: Path, content: dict[str, Any]) -> None:
     """Write a checkpoint of tensors, arrays, numbers, text, lists and dictionaries."""
     buffer = io.BytesIO()
-    torch.save(_tensors(content), buffer)
+    torch.save(tensors(content), buffer)
     payload = buffer.getvalue()
     write_bytes(path, MARK + hashlib.sha256(payload).digest() + payload)
 
@@ -64,14 +64,14 @@ def load(path: Path) -> dict[str, Any]:
     return content
 
 
-def _tensors(value: Any) -> Any:
+def tensors(value: Any) -> Any:
     """Return the content with arrays as tensors, which need no code to read."""
     if isinstance(value, (np.ndarray, np.generic)):
         return torch.from_numpy(np.array(value))
     if isinstance(value, dict):
-        return {key: _tensors(entry) for key, entry in value.items()}
+        return {key: tensors(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_tensors(entry) for entry in value]
+        return [tensors(entry) for entry in value]
     if value is None or isinstance(value, (bool, int, float, str, torch.Tensor)):
         return value
     raise TypeError(f"a checkpoint holds no {type(value).__name__}")

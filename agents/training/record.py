@@ -27,8 +27,7 @@ PACKAGES = (
     *("numpy", "scipy", "numba", "gymnasium"),
     *("torch", "stable_baselines3", "sb3_contrib", "onnx"),
 )
-CHECKPOINT = "checkpoint.pt"
-SETTINGS = "settings.json"
+CHECKPOINT, LOCK = "checkpoint.pt", "training.lock"
 CPU_FILE = Path("/proc/cpuinfo")
 
 

@@ -9,6 +9,7 @@ import json
 import random
 from collections import deque
 from collections.abc import Iterator
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,10 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
+from agents.training.checkpoint import tensors
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
+from pam_envs.wording import shown
 
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
 LAST = ("_last_obs", "_last_episode_starts", "_last_original_obs")
@@ -28,7 +31,13 @@ ARRAYS: dict[type[VecEnv], tuple[str, ...]] = {
     HistoryVecEnv: ("past", "last"),
 }
 """Arrays of the wrappers' states."""
+ADAM = {"step", "exp_avg", "exp_avg_sq"}
+"""State of a parameter in the optimiser of every algorithm."""
 BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+MOST = 2**53
+"""Largest number of a snapshot; whole ones are counts from 0."""
 
 
 def take(model: BaseAlgorithm) -> dict[str, Any]:
@@ -51,10 +60,19 @@ def take(model: BaseAlgorithm) -> dict[str, Any]:
 
 
 def restore(model: BaseAlgorithm, snapshot: dict[str, Any]) -> None:
-    """Restore a snapshot in a model that was built with the same settings."""
+    """Restore a snapshot in a model that was built with the same settings.
+
+    Raises ValueError, before anything is restored, if the snapshot has other keys, types or shapes
+    than the model, or a number that is not finite.
+    """
     env = model.get_env()
     assert env is not None
+    if snapshot["counters"]["num_timesteps"] > 0:  # the wrappers have all their arrays then
+        _begin(model, env)
+    check(snapshot, tensors(take(model)), "snapshot")
+    _check_replay(model, snapshot["replay"])
     model.set_parameters(snapshot["parameters"], exact_match=True, device="cpu")
+    _check_optimizers(model)
     for name, tensor in snapshot["tensors"].items():
         getattr(model, name).data.copy_(tensor)
     for name, value in snapshot["counters"].items():
@@ -75,6 +93,85 @@ def restore(model: BaseAlgorithm, snapshot: dict[str, Any]) -> None:
     state = {name: value.numpy().copy() for name, value in snapshot["env"].items()}
     env.unwrapped.set_state(state)  # type: ignore[attr-defined]
     _restore_random_state(model, snapshot["random"])
+
+
+GROWING = ("snapshot/episodes", "snapshot/replay")
+"""Parts whose sizes depend on how far a training is; so does the state of an optimiser."""
+ANY = object()
+
+
+def check(given: Any, like: Any, place: str) -> None:
+    """Raise ValueError unless a part of a snapshot has the structure of a model's own, ``like``.
+
+    Where that is ``ANY``, numbers need only be finite.
+    """
+    free = like is ANY or place.startswith(GROWING) or place.endswith("optimizer/state")
+    if isinstance(given, dict) and (free or isinstance(like, dict)):
+        own: dict[Any, Any] = {} if free else like
+        if not free and given.keys() != own.keys():
+            raise ValueError(f"{place} has other keys than the model")
+        for key, value in given.items():
+            check(value, own.get(key, ANY), f"{place}/{key}")
+    elif isinstance(given, list) and (free or isinstance(like, list)):
+        if not free and len(given) != len(like):
+            raise ValueError(f"{place} has another length than in the model")
+        for i, value in enumerate(given):
+            check(value, ANY if free else like[i], f"{place}/{i}")
+    elif not free and (
+        type(given) is not type(like) or getattr(given, "dtype", 0) != getattr(like, "dtype", 0)
+    ):
+        raise ValueError(f"{place} is a {type(given).__name__}, in the model {type(like).__name__}")
+    elif isinstance(given, torch.Tensor):
+        if not free and given.shape != like.shape:
+            raise ValueError(
+                f"{place} has the shape {[*given.shape]}, in the model {[*like.shape]}"
+            )
+        if not torch.isfinite(given).all():
+            raise ValueError(f"{place} has a value that is not finite")
+    elif (
+        isinstance(given, (int, float)) and not (0 if type(like) is int else -MOST) <= given <= MOST
+    ):
+        raise ValueError(f"{place} = {shown(given)} is out of range")
+
+
+def _begin(model: BaseAlgorithm, env: VecEnv) -> None:
+    """Give the model first observations, as its learning does."""
+    first: Any = env.reset()
+    model._last_obs, model._last_episode_starts = first, np.ones(env.num_envs, bool)
+    normaliser = model.get_vec_normalize_env()
+    if normaliser is not None:
+        normaliser.old_reward = np.zeros(env.num_envs, np.float32)
+    known = normaliser is not None or isinstance(model, OffPolicyAlgorithm)
+    model._last_original_obs = first if known else None
+
+
+def _check_optimizers(model: BaseAlgorithm) -> None:
+    """Raise ValueError unless the moments of each optimiser have the shapes of its parameters."""
+    for name in model._get_torch_save_params()[0]:
+        part = attrgetter(name)(model)
+        states = getattr(part, "state", {})
+        for parameter, state in states.items():
+            good = [torch.is_tensor(m) and m.shape in (parameter.shape, ()) for m in state.values()]
+            if not all(good) or state.keys() != ADAM:
+                raise ValueError(f"the moments of {name} do not have the shapes of its parameters")
+
+
+def _check_replay(model: BaseAlgorithm, saved: dict[str, Any] | None) -> None:
+    """Raise ValueError unless a saved replay buffer fits the model's and its own counters."""
+    if not isinstance(model, OffPolicyAlgorithm):
+        if saved is not None:
+            raise ValueError("snapshot/replay is that of another algorithm")
+        return
+    if not isinstance(saved, dict) or model.replay_buffer is None:
+        raise ValueError("snapshot/replay is missing")
+    buffer, position = model.replay_buffer, saved["pos"]
+    size = buffer.buffer_size
+    filled = size if saved["full"] is True else position
+    if not 0 <= position < size + (saved["full"] is False):
+        raise ValueError(f"snapshot/replay/pos = {position} is outside the buffer of {size}")
+    for name in BUFFER:
+        if saved[name].shape != (filled, *getattr(buffer, name).shape[1:]):
+            raise ValueError(f"snapshot/replay/{name} has another shape than its counters say")
 
 
 def _episodes(model: BaseAlgorithm) -> np.ndarray[Any, Any]:
@@ -165,6 +262,8 @@ def _random_state(model: BaseAlgorithm) -> dict[str, Any]:
 def _restore_random_state(model: BaseAlgorithm, saved: dict[str, Any]) -> None:
     torch.set_rng_state(saved["torch"])
     keys, position, has_gauss, cached = saved["numpy"]
+    if not 0 <= position <= len(keys):  # numpy does not check it
+        raise ValueError(f"the random generator is at {position} of {len(keys)} words")
     state = ("MT19937", keys.numpy().astype(np.uint32), position, has_gauss, cached)
     np.random.set_state(state)  # noqa: NPY002
     version, words, gauss = json.loads(saved["python"])

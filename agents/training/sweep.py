@@ -12,11 +12,11 @@ from filelock import FileLock
 
 from agents.policies.policy_file import POLICY, RECORD, finished
 from agents.settings.presets import Config
-from agents.training.record import Run
+from agents.training.record import LOCK, Run
 from sweeps import engine
 from sweeps.files import write_bytes
 
-LOG, LOCK = "log.txt", "training.lock"
+LOG = "log.txt"
 
 
 def trainings(

@@ -1,9 +1,8 @@
 """Training: a policy from settings, a seed and a folder; a killed run continues.
 
-The folder holds ``settings.json``, ``checkpoint.pt`` (:mod:`agents.training.snapshot`),
-``tensorboard/`` and, at the end, ``policy.onnx`` with its record ``policy.json``. The exported
-policy is the best of those that were evaluated (:mod:`agents.training.best`), or the last without
-evaluations.
+The folder holds ``checkpoint.pt`` (:mod:`agents.training.snapshot`), ``tensorboard/`` and, at the
+end, ``policy.onnx`` with its record ``policy.json``. The exported policy is the best of those that
+were evaluated (:mod:`agents.training.best`), or the last without evaluations.
 
 Exactness: a checkpoint is taken at the start of a rollout. A run that was killed and resumed ends
 with the same bits and the same ``policy.onnx`` as an uninterrupted one, for every algorithm,
@@ -13,10 +12,13 @@ differs: it holds the steps between the last checkpoint and the kill twice.
 """
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
 from rich.console import Console
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
@@ -29,8 +31,24 @@ from agents.training.best import Best
 from agents.training.building import make_env, make_model
 from agents.training.callbacks import Checkpoints, Evaluations
 from agents.training.checkpoint import CheckpointError
-from agents.training.record import CHECKPOINT, SETTINGS, Clock, Run, cost
+from agents.training.record import CHECKPOINT, LOCK, Clock, Run, cost
 from sweeps.progress import progress
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Hold the lock of a run's folder; raise while another process trains in it."""
+    lock = FileLock(folder / LOCK, timeout=0.0)
+    try:
+        lock.acquire()
+    except Timeout as error:
+        raise CheckpointError(
+            f"another process trains in {folder}; wait for it, or give another --out"
+        ) from error
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def start(run: Run) -> BaseAlgorithm:
@@ -44,21 +62,12 @@ def start(run: Run) -> BaseAlgorithm:
     model = make_model(run.config, run.seed, make_env(run.config))
     if run.config.residual.controller:
         facts(model)
-    first = {"config": run.config.as_dict(), "seed": run.seed}
-    (run.folder / SETTINGS).write_text(json.dumps(first, indent=1), encoding="utf-8")
     return model
 
 
 def saved_run(folder: Path, steps: int | None = None) -> Run:
-    """Return the run of a folder, with another number of steps if given.
-
-    The settings are those of the checkpoint; before the first one, those of the start.
-    """
-    first = folder / SETTINGS
-    if first.exists() and not (folder / CHECKPOINT).exists():
-        settings = json.loads(first.read_text(encoding="utf-8"))
-    else:
-        settings = _settings(checkpoint.load(folder / CHECKPOINT))
+    """Return the run of a folder's checkpoint, with another number of steps if given."""
+    settings = _settings(checkpoint.load(folder / CHECKPOINT))
     given = settings["config"]
     if steps is not None:
         given = {**given, "steps": steps}
@@ -68,8 +77,10 @@ def saved_run(folder: Path, steps: int | None = None) -> Run:
 def _settings(content: dict[str, Any]) -> dict[str, Any]:
     try:
         settings: dict[str, Any] = json.loads(content["settings"])
+        if type(settings["seed"]) is not int or settings["seed"] < 0:
+            raise ValueError("seed")
         return {key: settings[key] for key in ("config", "seed", "plants")}
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise CheckpointError("the checkpoint lacks the settings of its training") from error
 
 
@@ -87,10 +98,8 @@ def resume(run: Run) -> BaseAlgorithm:
     model.ep_info_buffer = None
     try:
         snapshot.restore(model, content["snapshot"])
-    except (KeyError, RuntimeError, ValueError, AttributeError) as error:
-        raise CheckpointError(
-            f"{run.checkpoint.name} does not fit its settings: {error}"
-        ) from error
+    except (LookupError, TypeError, RuntimeError, ValueError, ArithmeticError, AttributeError) as e:
+        raise CheckpointError(f"{run.checkpoint.name} does not fit its settings: {e}") from e
     return model
 
 
@@ -98,7 +107,7 @@ def train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
     """Train to the end of the run, write its policy and return the policy's path."""
     sinks = ["tensorboard"] if find_spec("tensorboard") else []
     model.set_logger(configure(str(run.folder / "tensorboard"), sinks))
-    clock, evaluations = _so_far(run, model.num_timesteps)
+    clock, evaluations = _so_far(run, model)
     checkpoints = Checkpoints(run, clock, evaluations)
     left = run.config.steps - model.num_timesteps
     if left > 0:
@@ -139,15 +148,18 @@ def train_to_the_end(run: Run, console: Console) -> Path:
     return done if finished(done) else train(run, resume(run), console)
 
 
-def _so_far(run: Run, steps: int) -> tuple[Clock, Evaluations]:
+def _so_far(run: Run, model: BaseAlgorithm) -> tuple[Clock, Evaluations]:
     """Return the time spent and the evaluations recorded up to the checkpoint."""
-    if not steps:
+    if not model.num_timesteps:
         return Clock(), Evaluations(run.config, [], Best())
     content = checkpoint.load(run.checkpoint)
     try:
         spent, best = content["spent"], Best(**content["best"])
+        snapshot.check({k: spent[k] for k in ("wall", "cpu")}, {"wall": 0.0, "cpu": 0.0}, "spent")
+        if best.steps >= 0:
+            snapshot.check(best.weights, checkpoint.tensors(model.policy.state_dict()), "best")
         best.moments = {name: moment.numpy() for name, moment in best.moments.items()}
         evaluations = Evaluations(run.config, list(content["evaluations"]), best)
         return Clock(spent["wall"], spent["cpu"]), evaluations
-    except (KeyError, TypeError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise CheckpointError(f"{run.checkpoint.name} lacks its evaluations: {error}") from error

@@ -134,6 +134,8 @@ def _restored(template: Any, saved: Any) -> Any:
     if isinstance(template, tuple):
         pairs = zip(template, saved, strict=True)
         return _like(template, [_restored(*pair) for pair in pairs])
+    if template is not None and saved.shape != np.shape(template):
+        raise ValueError(f"a controller's state has the shape {[*saved.shape]}")
     return None if template is None else saved.numpy().astype(template.dtype)
 
 

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from baselines.core.entry import SUFFIXES, Entry, Knobs, check_knobs
+from pam_envs import yaml_file
 
 FILE = Path(__file__).with_name("tuned.yaml")
 SCHEMA = 1
@@ -54,7 +53,7 @@ def tuned_name(controller: str, env: str) -> str:
 
 def read(file: Path = FILE) -> dict[str, Tuned]:
     """Return the results of searches by their names in the catalogue."""
-    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    content = yaml_file.read(file, "tuned values")
     if not isinstance(content, dict) or content.get("schema") != SCHEMA:
         raise ValueError(
             f"{file.name} is not of schema {SCHEMA}; restore the file of the last commit, and add "

@@ -43,7 +43,7 @@ class KneeNominal:
         return operator_of(self.plant.hysteresis.scaled).rows()
 
     @cached_property
-    def _per_output(self) -> float:
+    def per_output(self) -> float:
         """Stiffness [N/m] over the hysteresis output."""
         muscle = self.plant.muscle
         return muscle.gain * (1.0 if self.plant.hysteresis.scaled else muscle.stiffness_ratio)
@@ -61,12 +61,17 @@ class KneeNominal:
 
     def line(self, stiffness: Array) -> Array:
         """Return the pressure [Pa] of a stiffness [N/m] on the line between the loop's tips."""
-        return np.asarray(stiffness * (self.full_pressure / self._full_stiffness))
+        return np.asarray(stiffness * self.per_stiffness)
+
+    @cached_property
+    def per_stiffness(self) -> float:
+        """Pressure over stiffness [Pa m/N] on the line between the loop's tips."""
+        return self.full_pressure / self._full_stiffness
 
     @cached_property
     def _full_stiffness(self) -> float:
         full, empty = np.array([self.full_pressure]), self.hysteresis.initial(1)
-        return self._per_output * float(self.hysteresis.forward(full, empty)[0][0])
+        return self.per_output * float(self.hysteresis.forward(full, empty)[0][0])
 
     def inflated(self, pressure: Array) -> RowsState:
         """Return the hysteresis state after inflation from 0 to a pressure [Pa]."""
@@ -79,11 +84,11 @@ class KneeNominal:
 
     def stiffness_after(self, pressure: Array, state: RowsState) -> Array:
         """Return the stiffness [N/m] at a pressure [Pa] that the history ends with."""
-        return self._per_output * self.hysteresis.forward(pressure, state)[0]
+        return self.per_output * self.hysteresis.forward(pressure, state)[0]
 
     def pressure_for(self, stiffness: Array, state: RowsState) -> Array:
         """Return the pressure [Pa], within the capacity, for a stiffness [N/m] after a history."""
-        found = self.hysteresis.inverse(stiffness / self._per_output, state)
+        found = self.hysteresis.inverse(stiffness / self.per_output, state)
         return np.minimum(np.maximum(found, 0.0), self.full_pressure)
 
     def tension_at_rest(self, pressure: Array) -> Array:
@@ -178,13 +183,21 @@ Limits = Callable[[KneeView], tuple[Array, Array]]
 """From a view to the lowest and highest setpoint [Pa] of the next period, shapes (n_env,)."""
 
 
-def set_point_limits(spec: Spec[KneeOrthosis]) -> Limits:
+@dataclass(frozen=True)
+class SetPointLimits:
+    """Limits of a setpoint that changes by at most ``step`` [Pa] in a period."""
+
+    low: float
+    high: float
+    step: float
+
+    def __call__(self, view: KneeView) -> tuple[Array, Array]:
+        """Return the lowest and highest setpoint [Pa] of the next period."""
+        low = np.maximum(self.low, view.set_point - self.step)
+        return low, np.minimum(self.high, view.set_point + self.step)
+
+
+def set_point_limits(spec: Spec[KneeOrthosis]) -> SetPointLimits:
     """Return the limits of a setpoint that changes no faster than the pressure of the plant can."""
     signal, plant = spec.actions["pressure_set_point"], spec.plant
-    step = plant.regulator.slew_rate * plant.control_period
-
-    def limits(view: KneeView) -> tuple[Array, Array]:
-        low = np.maximum(signal.low, view.set_point - step)
-        return low, np.minimum(signal.high, view.set_point + step)
-
-    return limits
+    return SetPointLimits(signal.low, signal.high, plant.regulator.slew_rate * plant.control_period)

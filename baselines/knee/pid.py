@@ -11,10 +11,18 @@ changes no faster than the pressure can, so that the rate limit saturates the co
 plant.
 """
 
+from dataclasses import dataclass
+
 from numpy.typing import ArrayLike
 
 from baselines.core.entry import AS_DESIGNED, KNEE, Entry, Knobs, Spec
-from baselines.knee.nominal import KneeNominal, make_knee_observer, set_point_limits
+from baselines.knee.nominal import (
+    KneeNominal,
+    KneeObserver,
+    Limits,
+    make_knee_observer,
+    set_point_limits,
+)
 from baselines.knee.published import printed_plant
 from baselines.linear.pid import DELAY_PERIODS, PI_KNOBS, Gains, Pid, PidView, simc_rule
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -37,15 +45,23 @@ def _sum_of_lags() -> float:
     return float((sum(1.0 / -p for p in plant.poles()) - sum(1.0 / -z for z in plant.zeros())).real)
 
 
+@dataclass(frozen=True)
+class TensionView:
+    """View of tension, setpoint and reference tension, with the limits of the setpoint."""
+
+    observer: KneeObserver
+    within: Limits
+
+    def __call__(self, observation: ArrayLike) -> PidView:
+        """Return the PID's view of an observation."""
+        seen = self.observer.read(observation)
+        return PidView(seen.set_point, seen.tension, seen.reference, *self.within(seen))
+
+
 def make_knee_pid(spec: Spec[KneeOrthosis]) -> Pid:
     """Return the controller."""
-    observer, signal = make_knee_observer(spec), spec.actions["pressure_set_point"]
-    within = set_point_limits(spec)
-
-    def view(observation: ArrayLike) -> PidView:
-        seen = observer.read(observation)
-        return PidView(seen.set_point, seen.tension, seen.reference, *within(seen))
-
+    signal = spec.actions["pressure_set_point"]
+    view = TensionView(make_knee_observer(spec), set_point_limits(spec))
     return Pid(simc_tension(spec.plant, spec.knobs), view, signal, spec.plant.control_period)
 
 

@@ -157,13 +157,13 @@ class Bumpless:
         difference = np.asarray(applied, float) - own
         if self.compensated:
             return BumplessState(after, self.model.advance(difference, state.model))
-        further = np.asarray(in_charge, bool) & (self._sign * difference * error < 0.0)
+        further = np.asarray(in_charge, bool) & (self.sign * difference * error < 0.0)
         limited = further & (np.abs(difference) > ROUNDING * (self.high - self.low))
         _, after = self.controller.step(np.where(limited, 0.0, error), state.controller)
         return BumplessState(after, state.model)
 
     @cached_property
-    def _sign(self) -> float:
+    def sign(self) -> float:
         """Sign of the model's static gain."""
         return float(np.sign(np.sum(self.model.rest_state(1.0) * self.model.c)))
 

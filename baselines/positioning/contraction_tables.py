@@ -116,7 +116,7 @@ def polynomials(loads: tuple[float, ...], coefficients: Array, spans: Array | No
     return BranchCurves(
         loads,
         [
-            [partial(_polynomial, *branch) for branch in zip(*load, strict=True)]
+            [partial(polynomial, *branch) for branch in zip(*load, strict=True)]
             for load in zip(coefficients, limits, strict=True)
         ],
     )
@@ -215,7 +215,8 @@ def _mean_curve(table: ContractionTable, load: float, inflating: bool) -> tuple[
     return pressure[order] / BAR, contraction.mean(axis=1)[order] / MM
 
 
-def _polynomial(coefficients: Array, span: Array, contraction: Array) -> Array:
+def polynomial(coefficients: Array, span: Array, contraction: Array) -> Array:
+    """Return a polynomial of contractions [mm], highest power first, which are held in a span."""
     return np.asarray(np.polyval(coefficients, np.clip(contraction, *span)))
 
 

@@ -84,7 +84,7 @@ class Inverse(RowController):
     horizon: float
 
     @cached_property
-    def _lag_gain(self) -> float:
+    def lag_gain(self) -> float:
         """Reciprocal of the share of a step that the regulator completes in the horizon."""
         return -1.0 / math.expm1(-self.horizon / self.nominal.plant.regulator.time_constant)
 
@@ -112,7 +112,7 @@ class Inverse(RowController):
     def feed_forward(self, measured: Array, now: InverseState) -> Array:
         """Return the setpoint [Pa], shape (n_env,), for the reference."""
         target = self._target(measured, now)
-        set_point = now.pressure + self._lag_gain * (target - now.pressure)
+        set_point = now.pressure + self.lag_gain * (target - now.pressure)
         signal = self.action_signal
         return np.asarray(np.minimum(np.maximum(set_point, signal.low), signal.high))
 
@@ -206,7 +206,7 @@ class InversePid(RowController):
     gains: Gains
 
     @cached_property
-    def _delay(self) -> tuple[int, float]:
+    def delay(self) -> tuple[int, float]:
         """Delay from the model's pressure to the contraction: whole and fractional periods."""
         nominal = self.inverse.nominal
         plant = nominal.plant
@@ -221,7 +221,7 @@ class InversePid(RowController):
         return InversePidState(
             inverse,
             pid_start(np.zeros_like(expected), measured[0] - expected),
-            np.repeat(expected[:, None], self._delay[0] + 2, axis=1),
+            np.repeat(expected[:, None], self.delay[0] + 2, axis=1),
         )
 
     def respond(self, observation: ArrayLike, now: InversePidState) -> Prediction:
@@ -229,7 +229,7 @@ class InversePid(RowController):
         measured = self.inverse.reader.rows(observation)
         contraction, load = measured[0], measured[2]
         forward = self.inverse.feed_forward(measured, now.inverse)
-        whole, part = self._delay
+        whole, part = self.delay
         expected = (1.0 - part) * now.expected[:, whole] + part * now.expected[:, whole + 1]
         signal, period = self.inverse.action_signal, self.inverse.nominal.plant.control_period
         error, low, high = expected - contraction, signal.low - forward, signal.high - forward

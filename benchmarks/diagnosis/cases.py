@@ -12,7 +12,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.diagnosis.sources import (
     HOME,
@@ -22,6 +21,7 @@ from benchmarks.diagnosis.sources import (
     draw_rig,
     outputs_of,
     sheet_of,
+    with_clock,
 )
 from pam_envs.arrays import Array
 from pam_envs.constants import BAR, MM
@@ -31,6 +31,7 @@ from pam_envs.diagnosis.audit.noise import noise_floor
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.decide.isolability import projected
 from pam_envs.diagnosis.diagnosis import Study
+from pam_envs.diagnosis.fit.least_squares import Problem
 from pam_envs.diagnosis.fit.single_muscle import start_plant
 from tests.diagnosis import hidden
 
@@ -41,13 +42,26 @@ CAMPAIGNS = {
     "short": hidden.campaign_short,
     "idle": hidden.campaign_idle,
 }
-SETS = {"small": 0, "tune": 1, "final": 2}
+SETS = {"small": 0, "tune": 1, "final": 2, "worlds": 3, "mutilated": 4}
 LARGE, WEAK = (1.0, 5.0), (0.1, 1.0)  # ranges of sizes
 LOUDER = 3.0  # relative noise of the ``loud`` cases
 BRIEF = (30.0, 60.0, 120.0)  # durations of the ``brief`` recordings [s]
+LACKING = {
+    "leak": "closed valve",
+    "temperature": "temperature",
+    "payload_error": "tolerance of the loads",
+    "wire_slack": "loads",
+}
+"""Causes of the ``untestable`` cases, and what their recording lacks."""
+ONE_LOAD = 15.0  # of a recording without other loads [N]
+STRONG = 6.0  # amplitude of an untestable effect that a refit absorbs at any amplitude
 MOST_AMPLITUDE = 20.0
 NEAR = 0.03  # tolerance of a size, in the logarithm
 ROUNDS, DRAWS = 16, 12  # largest numbers of trials of an amplitude, and of rigs
+
+
+class Unmade(ValueError):
+    """An effect that has not the drawn size on any drawn rig, at any amplitude."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +70,8 @@ class Case:
 
     # "loud": a single effect under three times the noise with the same absolute size; "idle": a
     # clean rig without motion, which cannot be decided; "brief": a recording of a clean rig of some
-    # seconds
+    # seconds; "clock": a clean rig whose readings are late; "untestable": a single effect whose
+    # experiment the recording lacks
     kind: str
     seed: int
     names: tuple[str, ...] = ()
@@ -65,6 +80,12 @@ class Case:
     noise: float = 1.0  # over the usual noise
     seconds: float = 0.0  # 0 for the whole campaign
     world: str = HOME
+    late: float = 0.0  # rows by which the readings of a ``clock`` case are late
+
+    @property
+    def lacking(self) -> str:
+        """What the recording of an untestable effect lacks."""
+        return LACKING[self.names[0]] if self.kind == "untestable" else ""
 
     def record(self) -> dict[str, Any]:
         """Return the case in plain types."""
@@ -73,7 +94,8 @@ class Case:
     @property
     def title(self) -> str:
         """Short description for messages."""
-        parts = [f"{n} {s:.2g}" for n, s in zip(self.names, self.sizes, strict=True)]
+        sizes = [f" {size:.2g}" for size in self.sizes] or [""] * len(self.names)
+        parts = [name + size for name, size in zip(self.names, sizes, strict=True)]
         return f"{self.world} {self.kind} {' + '.join(parts)} seed {self.seed}".replace(
             "  ", " "
         ).strip()
@@ -103,14 +125,14 @@ class Ground:
     campaign: hidden.Campaign
     clean: Array  # outputs without effect and noise [m], [Pa], shape (2, T)
     basis: Array  # orthonormal basis of the subspace
-    order: NDArray[np.int64]  # of a flattened trace in it
+    problem: Problem | None  # order of the residuals; None without a basis
 
     def left(self, trace: Array) -> Array:
         """Return the part of a trace (2, T) [m], [Pa] that a refit does not absorb, over noise."""
-        flat = (trace / NOISE[:, None]).ravel()
-        rows = np.empty_like(flat)
-        rows[self.order] = projected(flat[self.order][None], self.basis)[0]
-        return rows.reshape(trace.shape)
+        if self.problem is None:
+            return trace / NOISE[:, None]
+        whole = self.problem.vectors((trace / NOISE[:, None]).reshape(1, -1))
+        return self.problem.rows(projected(whole, self.basis)[0])
 
     def size(self, trace: Array) -> float:
         """Return the size of a trace."""
@@ -147,20 +169,35 @@ def recording_of(columns: dict[str, Any], sheet: Rig, source: str) -> Recording:
         contraction=columns["contraction_mm"] * MM,
         load=columns["load_N"],
         segment=columns["segment"].tolist(),
-        temperature=columns["temperature_C"],
+        temperature=columns.get("temperature_C"),
         valve_closed=sheet.valve_closed,
         source=source,
     )
 
 
-def ground_of(base: Any, campaign: hidden.Campaign, seed: int = 0) -> Ground:
+def observed(
+    case: Case, base: Any, effects: Effects, campaign: hidden.Campaign, source: str
+) -> tuple[Recording, Rig]:
+    """Return recording and rig file of a rig, without what the case lacks."""
+    sheet = sheet_of(base, campaign, case.noise)
+    columns = columns_of(base, effects, campaign, case.seed + 7, case.noise)
+    if case.lacking == "temperature":
+        del columns["temperature_C"]
+    if case.lacking == "tolerance of the loads":
+        sheet = replace(sheet, tolerance={})
+    return recording_of(columns, sheet, source), sheet
+
+
+def ground_of(case: Case, base: Any, campaign: hidden.Campaign) -> Ground:
     """Fit the plant's flexible base to a recording of a clean rig."""
-    sheet, clean = sheet_of(base, campaign), outputs_of(base, [], campaign)
-    recording = recording_of(columns_of(base, [], campaign, seed), sheet, "clean")
+    clean = outputs_of(base, [], campaign)
+    if not case.names:  # nothing whose size is asked
+        return Ground(base, campaign, clean, np.zeros((0, clean.size)), None)
+    recording, sheet = observed(replace(case, noise=1.0), base, [], campaign, "clean")
     floor = noise_floor(recording, sheet)
     study = Study.begin(recording, sheet, start_plant(sheet), floor)
     study.make_flexible(catalogue())
-    return Ground(base, campaign, clean, study.subspace, study.problem.order)
+    return Ground(base, campaign, clean, study.subspace, study.problem)
 
 
 def solve(ground: Ground, effect: Any, target: float) -> tuple[float, Array] | None:
@@ -190,12 +227,16 @@ def _next(amplitude: float, size: float, target: float, low: float, high: float)
 def _draw(case: Case, attempt: int) -> tuple[Ground, list[tuple[Any, float, Array]]] | None:
     """Draw a rig and its effects; None if a size is out of reach."""
     rng = np.random.default_rng([case.seed, attempt])
-    base = draw_rig(case.world, rng, decoy=case.kind == "decoy")
-    ground = ground_of(base, _campaign(case), case.seed + 7)
+    base, campaign = draw_rig(case.world, rng, decoy=case.kind == "decoy"), _campaign(case)
+    if case.kind == "clock":
+        base = with_clock(base, case.late * campaign.period)
+    ground = ground_of(case, base, campaign)
     found = []
     for name, size in zip(case.names, case.sizes, strict=True):
         effect = draw_effect(name, base, rng)
         solved = solve(ground, effect, size)
+        if solved is None and case.kind == "untestable":
+            solved = STRONG, outputs_of(base, [(effect, STRONG)], campaign) - ground.clean
         if solved is None:
             return None
         found.append((effect, *solved))
@@ -205,6 +246,10 @@ def _draw(case: Case, attempt: int) -> tuple[Ground, list[tuple[Any, float, Arra
 def _campaign(case: Case) -> hidden.Campaign:
     """Return the campaign of a case, up to the end of its recording."""
     whole = CAMPAIGNS[case.campaign](case.seed)
+    if case.lacking == "closed valve":
+        whole = replace(whole, valve_closed=np.zeros_like(whole.valve_closed))
+    if case.lacking == "loads":
+        whole = replace(whole, load_N=np.full_like(whole.load_N, ONE_LOAD))
     if not case.seconds:
         return whole
     n = round(case.seconds / whole.period)
@@ -213,17 +258,17 @@ def _campaign(case: Case) -> hidden.Campaign:
 
 
 def make(case: Case) -> Made:
-    """Draw a case; a ValueError if no drawn rig has effects of the target sizes."""
+    """Draw a case; raise Unmade if no drawn rig has effects of the target sizes."""
     drawn = next(filter(None, (_draw(case, k) for k in range(DRAWS))), None)
     if drawn is None:
-        raise ValueError(f"{case.title}: the effect is too small on all of {DRAWS} drawn rigs")
+        raise Unmade(f"{case.title}: the effect is too small on all of {DRAWS} drawn rigs")
     ground, found = drawn
     effects = [(effect, amplitude) for effect, amplitude, _ in found]
     outputs = outputs_of(ground.base, effects, ground.campaign)
-    sheet = sheet_of(ground.base, ground.campaign, case.noise)
-    columns = columns_of(ground.base, effects, ground.campaign, case.seed + 7, case.noise)
+    source = f"case {case.seed}"
+    recording, sheet = observed(case, ground.base, effects, ground.campaign, source)
     return Made(
-        recording_of(columns, sheet, f"case {case.seed}"),
+        recording,
         sheet,
         ground,
         tuple(_truths(ground, found, outputs)),

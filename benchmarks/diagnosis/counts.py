@@ -34,9 +34,14 @@ Numbers = dict[str, Any]
 
 @dataclass(frozen=True)
 class Answer:
-    """The verdict of a record in the categories of the statistics."""
+    """The verdict of a record in the categories of the statistics.
+
+    Names that the rig deserves by nature are left out; a verdict ``named`` on nothing else is
+    ``adequate``.
+    """
 
     kind: str
+    world: str
     truth: tuple[str, ...]
     sizes: tuple[float, ...]
     verdict: str
@@ -48,13 +53,19 @@ class Answer:
     def of(cls, record: Mapping[str, Any]) -> "Answer":
         """Read a record."""
         case, failed = record["case"], bool(record["failure"])
+        nature = set(record.get("nature", ())) - set(case["names"])
+        said = [] if failed else record["names"]
+        names = tuple(name for name in said if name not in nature)
+        others = [] if failed else [frozenset(name.split("+")) - nature for name in record["open"]]
+        verdict = "failed" if failed else record["verdict"]
         return cls(
             case["kind"],
+            case["world"],
             tuple(case["names"]),
             tuple(case["sizes"]),
-            "failed" if failed else record["verdict"],
-            () if failed else tuple(record["names"]),
-            () if failed else tuple(frozenset(name.split("+")) for name in record["open"]),
+            "adequate" if verdict == "named" and said and not names else verdict,
+            names,
+            tuple(others),
             record,
         )
 

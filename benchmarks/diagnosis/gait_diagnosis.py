@@ -192,7 +192,7 @@ def diagnose(recording: GaitRecording) -> Outcome:
     plain = family.simulate(family.column[None])[0, :, 0]
     noise = np.array([white_noise(recording.torque - plain, recording.stride)])
     problem = Problem(family.simulate, measured, noise, blocks.train, recording.time)
-    base = fit_base(problem, blocks, family.column, family.base())
+    base = fit_base(problem, blocks, family.column, [family.base()])
     decision = decide(problem, family, blocks, base, CAUSES, family.regressors(), Rule())
     return Outcome(recording, problem, blocks, base, decision)
 

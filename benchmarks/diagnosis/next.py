@@ -8,7 +8,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.diagnosis.cases import NOISE, Case, Made, recording_of
-from benchmarks.diagnosis.sources import sheet_of
+from benchmarks.diagnosis.sources import Effects, columns_of, sheet_of
 from pam_envs.arrays import Array
 from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.recording import Recording
@@ -40,11 +40,9 @@ def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:
         runs = [(made.effects, before), (made.effects, extra)]
     else:
         share = before.command_bar.size / whole.command_bar.size
-        runs = [([(_sooner(effect, share), a) for effect, a in made.effects], whole)]
+        runs = [(_sooner(made.effects, share), whole)]
     columns = [
-        hidden.make_recording(
-            made.ground.base, effects, campaign, case.seed + 13 + k, noise_factor=case.noise
-        )
+        columns_of(made.ground.base, effects, campaign, case.seed + 13 + k, case.noise)
         for k, (effects, campaign) in enumerate(runs)
     ]
     joined = {name: np.concatenate([run[name] for run in columns]) for name in columns[0]}
@@ -66,11 +64,20 @@ def _campaign(plan: Plan, before: hidden.Campaign) -> hidden.Campaign:
     )
 
 
-def _sooner(effect: hidden.Effect, share: float) -> hidden.Effect:
-    """Keep the absolute time of an event given as a share of the run when the run gets longer."""
-    if "slip_time" not in effect.shape:
-        return effect
-    return replace(effect, shape={**effect.shape, "slip_time": share * effect.shape["slip_time"]})
+def _sooner(effects: Effects, share: float) -> Effects:
+    """Keep the absolute time of an event given as a share of the run when the run gets longer.
+
+    The worlds give absolute times.
+    """
+    made = []
+    for effect, amplitude in effects:
+        shape = dict(getattr(effect, "shape", {}))
+        if "slip_time" in shape:
+            shape["slip_time"] *= share
+            made.append((replace(effect, shape=shape), amplitude))
+        else:
+            made.append((effect, amplitude))
+    return made
 
 
 # --- controllers on the rig ---------------------------------------------------------------------

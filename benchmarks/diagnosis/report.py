@@ -8,7 +8,15 @@ from typing import Any
 from benchmarks.diagnosis import counts as counting
 from benchmarks.diagnosis.counts import BINS, GAP, HELD_OUT, VERDICTS, Answer, Numbers, share
 from benchmarks.diagnosis.figure import picture
-from benchmarks.diagnosis.markdown import bullets, table
+from benchmarks.diagnosis.markdown import (
+    bound_text,
+    bullets,
+    number,
+    percent,
+    reached,
+    share_text,
+    table,
+)
 from benchmarks.runs.store import write_record, write_text
 from sweeps.files import write_bytes
 from tests.diagnosis.hidden import EFFECTS
@@ -79,33 +87,6 @@ def _of_tables(report: Mapping[str, Any] | None) -> Numbers:
     return {"n": n, **dict(zip(names, found, strict=True))}
 
 
-def _percent(found: Mapping[str, Any], key: str = "value") -> str:
-    return "-" if found[key] is None else f"{100.0 * found[key]:.1f} %"
-
-
-def _share_text(found: Mapping[str, Any]) -> str:
-    """Return a share with its interval."""
-    if not found["n"]:
-        return "not run"
-    low, high = (100.0 * v for v in found["interval"])
-    return f"{_percent(found)} [{low:.1f}, {high:.1f}]"
-
-
-def _bound(found: Mapping[str, Any]) -> str:
-    """Return a share with its upper bound."""
-    return f"{_percent(found)}, bound {_percent(found, 'upper')}" if found["n"] else "not run"
-
-
-def _reached(found: Mapping[str, Any], key: str) -> str:
-    """Return a share with its interval or bound, or a quantile."""
-    form = {"value": _share_text, "upper": _bound}.get(key)
-    return form(found) if form else _percent(found, key)
-
-
-def _number(value: float | None, form: str = ".2f") -> str:
-    return "-" if value is None else format(value, form)
-
-
 def targets(made: Numbers) -> list[tuple[str, str, str, int, bool | None]]:
     """Return figure, target, reached value, number of cases, and whether the target is met."""
     rows: list[tuple[str, str, str, int, bool | None]] = []
@@ -118,12 +99,12 @@ def targets(made: Numbers) -> list[tuple[str, str, str, int, bool | None]]:
     ) -> None:
         n = found["n"]
         met = n and found[key] >= least
-        row(label, f"at least {100 * least:g} %", _reached(found, key) + more, n, met)
+        row(label, f"at least {100 * least:g} %", reached(found, key) + more, n, met)
 
     def at_most(label: str, found: Numbers, most: float, key: str = "upper", of: int = 1) -> None:
         n, what = found["n"], "bound at most" if key == "upper" else "at most"
         target = f"{what} {100 * most:g} %" + f", n at least {of}" * (of > 1)
-        row(label, target, _reached(found, key), n, n >= of and found[key] <= most)
+        row(label, target, reached(found, key), n, n >= of and found[key] <= most)
 
     single, least, ahead = made["right_first"], made["least_right_first"], made["next"]
     few, name = min((c["right_first"]["n"], name) for name, c in made["by_cause"].items())
@@ -145,11 +126,11 @@ def targets(made: Numbers) -> list[tuple[str, str, str, int, bool | None]]:
     at_least("three times the noise: correct name first", made["loud"], 0.97)
     took, table, loop = made["whole_report_s"], made["tables"], made["loop"]
     n, most, label = took["n"], took["most"], "10 minutes at 50 Hz on 2 cores: whole report"
-    row(label, f"at most {SECONDS:g} s", f"{_number(most, '.1f')} s", n, n and most <= SECONDS)
-    value = f", {_number(table['before_mm'])} to {_number(table['linear_mm'])} mm"
+    row(label, f"at most {SECONDS:g} s", f"{number(most, '.1f')} s", n, n and most <= SECONDS)
+    value = f", {number(table['before_mm'])} to {number(table['linear_mm'])} mm"
     at_least("measured tables, held-out load, linear law: error decrease", table, 0.30, value)
     n, late = table["n"], table["post_hoc_mm"]
-    value = f"{_number(late)} mm; noise floor {_number(table['floor_mm'], '.3f')} mm"
+    value = f"{number(late)} mm; noise floor {number(table['floor_mm'], '.3f')} mm"
     met, label = n and round(late, 2) <= POST_HOC_MM, "the same, exponent post hoc, not held out"
     row(label, f"about {POST_HOC_MM} mm", value, n, met)
     gap = f"closed loop, gap of at least {100 * GAP:g} %"
@@ -195,10 +176,10 @@ def _causes_table(made: Numbers) -> str:
             continue
         doubt, wrong, back = found["ambiguous_with_truth"], found["wrong"], found["recovery"]
         right, raw, trace = found["right_first"], found["raw"], found["trace"]
-        cells = [f"`{name}`", right["n"], _share_text(right), _percent(found["exact"])]
+        cells = [f"`{name}`", right["n"], share_text(right), percent(found["exact"])]
         cells += [f"{some['count']} of {some['n']}" for some in (doubt, wrong)]
-        cells += [_number(raw["median"]), _percent(trace, "median"), _percent(found["held_out"])]
-        rows.append([*cells, _number(back["median_ratio"]), _number(back["rank_correlation"])])
+        cells += [number(raw["median"]), percent(trace, "median"), percent(found["held_out"])]
+        rows.append([*cells, number(back["median_ratio"]), number(back["rank_correlation"])])
     note = (
         "*Raw / size*: the effect before the refit of the base over its size, median. "
         f"*Held out*: share of the named cases with at most {HELD_OUT:g} times the noise floor. "
@@ -236,7 +217,7 @@ def _curve_table(made: Numbers) -> str:
     keys = ("detected", "right_first", "exact", "wrong")
     head = ["size", "n", "model error detected", "correct first", "unambiguous", "wrong name"]
     rows = [
-        [f"{c['low']:g} to {c['high']:g}", c["exact"]["n"], *[_share_text(c[k]) for k in keys]]
+        [f"{c['low']:g} to {c['high']:g}", c["exact"]["n"], *[share_text(c[k]) for k in keys]]
         for c in made["curve"]
     ]
     return table(head, rows, True) + "\n"
@@ -245,30 +226,30 @@ def _curve_table(made: Numbers) -> str:
 def _others(made: Numbers) -> str:
     alarms = ", ".join(f"`{name}` {n}" for name, n in made["alarms"].items()) or "none"
     lines = [
-        f"false alarm, clean: {_bound(made['false_alarms_clean'])}",
+        f"false alarm, clean: {bound_text(made['false_alarms_clean'])}",
         f"false alarm, decoys (a wrong value of a base parameter): "
-        f"{_bound(made['false_alarms_decoy'])}",
-        f"a cause claimed on either: {_bound(made['false_names'])}",
+        f"{bound_text(made['false_alarms_decoy'])}",
+        f"a cause claimed on either: {bound_text(made['false_names'])}",
         f"answers of the false alarms: {alarms}",
-        f"recordings without motion: `insufficient` {_share_text(made['idle'])}",
+        f"recordings without motion: `insufficient` {share_text(made['idle'])}",
         f"false alarm, clean rigs recorded for 30, 60 or 120 s: "
-        f"{_bound(made['false_alarms_brief'])}; answers: "
+        f"{bound_text(made['false_alarms_brief'])}; answers: "
         + (", ".join(f"`{name}` {n}" for name, n in made["brief"].items()) or "none"),
-        f"pairs: both named unambiguously {_share_text(made['pair_exact'])}, only one of them "
-        f"{_share_text(made['pair_one'])}, a wrong name {_share_text(made['pair_wrong'])}, "
-        f"correct name first {_share_text(made['pair_first'])}; trace error "
-        f"{_percent(made['trace_pairs'], 'median')}",
-        f"wrong extra cause on weak effects: {_share_text(made['extra_weak'])}",
-        f"wrong first name, any size: {_bound(made['wrong_first'])}",
+        f"pairs: both named unambiguously {share_text(made['pair_exact'])}, only one of them "
+        f"{share_text(made['pair_one'])}, a wrong name {share_text(made['pair_wrong'])}, "
+        f"correct name first {share_text(made['pair_first'])}; trace error "
+        f"{percent(made['trace_pairs'], 'median')}",
+        f"wrong extra cause on weak effects: {share_text(made['extra_weak'])}",
+        f"wrong first name, any size: {bound_text(made['wrong_first'])}",
         "ambiguous, with the hidden cause not excluded: "
-        f"{_share_text(made['ambiguous_with_truth'])}",
-        f"three times the noise: unambiguous {_share_text(made['loud_exact'])}, a wrong name "
-        f"{_share_text(made['loud_wrong'])}",
+        f"{share_text(made['ambiguous_with_truth'])}",
+        f"three times the noise: unambiguous {share_text(made['loud_exact'])}, a wrong name "
+        f"{share_text(made['loud_wrong'])}",
     ]
     rows = []
     for name, found in made["unknown_by_kind"].items():
         others = ", ".join(f"{k} {n}" for k, n in found["others"].items())
-        rows.append([f"`{name}`", found["n"], _share_text(found), others])
+        rows.append([f"`{name}`", found["n"], share_text(found), others])
     head = ["outside the catalogue", "n", "`unexplained`", "else"]
     unknown = table(head, rows, True) + "\n" if rows else ""
     return bullets(lines) + "\n" + unknown
@@ -280,26 +261,26 @@ def _after(made: Numbers) -> str:
     better = loop["better_percent"]
     lines = [
         f"held-out error over the noise floor, the worse output, of {held['n']} named cases: "
-        f"median {_number(held['median'])}, 90 % quantile {_number(held['q90'])}",
-        f"RMS of the found over the hidden effect: median {_number(back['median_ratio'])}, rank "
-        f"correlation {_number(back['rank_correlation'])} (n = {back['n']})",
+        f"median {number(held['median'])}, 90 % quantile {number(held['q90'])}",
+        f"RMS of the found over the hidden effect: median {number(back['median_ratio'])}, rank "
+        f"correlation {number(back['rank_correlation'])} (n = {back['n']})",
         f"{ahead['ambiguous']} ambiguous cases, {ahead['promised']} with a proposed experiment of "
-        f"at least one noise variance; resolved {_share_text(ahead['resolved'])}",
+        f"at least one noise variance; resolved {share_text(ahead['resolved'])}",
         f"closed loop on the hidden rig: {loop['n']} cases, {loop['gap']} with a gap of at least "
         f"{100 * GAP:g} % between the plant before and the rig itself; error of all lower by "
-        f"{_number(better['median'], '.1f')} % in the median ({_number(better['q10'], '.1f')} to "
-        f"{_number(better['q90'], '.1f')}); over 5 % worse {_share_text(loop['worse_of_all'])}",
-        f"seconds a diagnosis: median {_number(took['median'], '.1f')}, 90 % quantile "
-        f"{_number(took['q90'], '.1f')}, 99 % {_number(took['q99'], '.1f')}, most "
-        f"{_number(took['most'], '.1f')}",
+        f"{number(better['median'], '.1f')} % in the median ({number(better['q10'], '.1f')} to "
+        f"{number(better['q90'], '.1f')}); over 5 % worse {share_text(loop['worse_of_all'])}",
+        f"seconds a diagnosis: median {number(took['median'], '.1f')}, 90 % quantile "
+        f"{number(took['q90'], '.1f')}, 99 % {number(took['q99'], '.1f')}, most "
+        f"{number(took['most'], '.1f')}",
     ]
     text = bullets(lines) + "\n"
     if loop["n"]:
         rows = [
             [
                 f"`{name}`",
-                *[found["n"], found["gap"], _percent(found["recovered"], "median")],
-                _number(found["better_percent"]["median"], ".1f"),
+                *[found["n"], found["gap"], percent(found["recovered"], "median")],
+                number(found["better_percent"]["median"], ".1f"),
             ]
             for name, found in loop["by_cause"].items()
         ]

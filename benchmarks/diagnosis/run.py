@@ -13,8 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.diagnosis import mutilated
 from benchmarks.diagnosis.cases import Case, cases
-from benchmarks.diagnosis.study import loops, promised, study
+from benchmarks.diagnosis.sources import HOME
+from benchmarks.diagnosis.study import loops, needs_oracle, promised, study
+from benchmarks.diagnosis.worlds import draws
 from benchmarks.identity.hashing import digest
 from benchmarks.runs import provenance
 from benchmarks.runs.runner import Computing
@@ -70,17 +73,20 @@ class Options:
     force: bool = False
     folder: Path = FOLDER
     computing: Computing = ONE_JOB
+    worlds: tuple[str, ...] = ()
+    each: int = 0  # number of cases of every kind in each world; 0 for all
 
     @property
     def whole(self) -> bool:
         """True if every case of the set is run."""
-        return not (self.kinds or self.names)
+        return not (self.kinds or self.names or self.worlds or self.each)
 
     @property
     def arguments(self) -> str:
         """Arguments of the command that gives the same records."""
         given: dict[str, Any] = {"chosen": self.chosen, "offset": self.offset or None}
         given |= {"kind": " ".join(self.kinds), "name": " ".join(self.names)}
+        given |= {"world": " ".join(self.worlds), "each": self.each or None}
         given["loops"] = self.loops or None
         words = [f"--{name} {value}" for name, value in given.items() if value not in (None, "")]
         return " ".join(words + ["--next"] * self.next)
@@ -96,23 +102,38 @@ class Report:
     found: int = 0  # stages already stored
     # failed cases, which count as wrong, with the reason
     failed: list[str] = field(default_factory=list)
+    # cases of worlds whose effect does not reach its size, which are counted apart
+    unmade: list[str] = field(default_factory=list)
     # corrupt records that were set aside and computed again
     quarantined: list[str] = field(default_factory=list)
 
 
 def select(options: Options) -> list[Case]:
     """Return the cases to run, kinds and causes mixed."""
-    drawn = cases(options.chosen, options.offset)
+    drawn = _drawn(options)
     _known("kind", options.kinds, {case.kind for case in drawn})
     _known("effect", options.names, {name for case in drawn for name in case.names})
+    _known("world", options.worlds, {case.world for case in drawn})
     matching = [
         case
         for case in drawn
         if (not options.kinds or case.kind in options.kinds)
         and (not options.names or set(options.names) & set(case.names))
+        and (not options.worlds or case.world in options.worlds)
     ]
     order = np.random.default_rng(SHUFFLE).permutation(len(matching))
     return [matching[k] for k in order]
+
+
+def _drawn(options: Options) -> list[Case]:
+    """Return the cases of a set."""
+    if options.chosen == "worlds":
+        return draws.cases(options.offset, options.each)
+    if options.chosen == "mutilated":
+        return mutilated.cases(options.offset)
+    if options.each:
+        raise ValueError(f"each = {options.each} is for the set worlds; leave it out")
+    return cases(options.chosen, options.offset)
 
 
 def _known(what: str, given: Iterable[str], known: Collection[str]) -> None:
@@ -133,17 +154,17 @@ def run(
     further = {
         "loop": _looped(chosen, options),
         "next": [case for case in chosen if options.next and promised(made[case])],
+        "oracle": [case for case in chosen if case.world != HOME and needs_oracle(made[case])],
     }
     for stage, some in further.items():
         for case, record in _stage(stage, some, store, options, report, start, act).items():
             failed = record["failure"]
             made[case][stage] = {"failure": failed} if failed else record.get(stage)
     report.records = sorted(made.values(), key=lambda r: (r["case"]["seed"], r["case"]["kind"]))
-    report.failed = [
-        f"{Case(**_tuples(record['case'])).title}: {record['failure']}"
-        for record in report.records
-        if record["failure"]
-    ]
+    for record in filter(lambda record: record["failure"], report.records):
+        apart = record.get("unmade") and record["case"]["world"]
+        case = Case(**_tuples(record["case"]))
+        (report.unmade if apart else report.failed).append(f"{case.title}: {record['failure']}")
     report.quarantined = sorted(set(store.quarantined()) - before)
     return report
 

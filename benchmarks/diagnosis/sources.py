@@ -6,6 +6,7 @@ equations.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,16 @@ Effects = list[tuple[Any, float]]
 HOME = ""
 """Name of the rig of the first study."""
 WORLDS: tuple[str, ...] = worlds.WORLDS
+HELD_OUT = (
+    "braid_gas_spring_lugre_orifice",
+    "hunt_tangent_wide_play_underdamped",
+    "sarosi_bouc_wen_length_delayed",
+    "logistic_skewed_play_all_at_once",
+    "rational_end_slip_slow_tail",
+)
+"""Worlds that are never used in the development of the diagnosis."""
+TUNED = tuple(world for world in WORLDS if world not in HELD_OUT)
+"""Worlds on which the diagnosis is developed."""
 BY_NATURE = ("static_law", "hysteresis_shape", "hysteresis_drive", "slew_limit", "dead_time")
 """Names that a clean rig may deserve: it differs from the base plant by nature."""
 
@@ -57,6 +68,23 @@ def columns_of(
 def nature_of(rig: Any) -> Mapping[str, bool]:
     """Return which of the names in :data:`BY_NATURE` a clean rig certainly deserves."""
     return {} if isinstance(rig, hidden.Base) else worlds.truth_of(rig)
+
+
+def deserved(rig: Any) -> list[str]:
+    """Return the names that are right on a clean rig, since it differs from the base by nature.
+
+    A rig of another world has another force law and other loops. Its rate limit, its dead time
+    and its drive of the loop are right only where they are there.
+    """
+    if isinstance(rig, hidden.Base):
+        return []
+    there = nature_of(rig)
+    return [name for name in BY_NATURE if there.get(name, True)]
+
+
+def with_clock(rig: Any, seconds: float) -> Any:
+    """Return a rig of a world whose readings are taken so much later than stated [s]."""
+    return replace(rig, nuisance=replace(rig.nuisance, clock_offset_s=seconds))
 
 
 def sheet_of(rig: Any, campaign: hidden.Campaign, noise: float = 1.0) -> Rig:

@@ -6,18 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import NOISE, Case, Made, make
+from benchmarks.diagnosis.cases import NOISE, Case, Made, Unmade, make
 from benchmarks.diagnosis.next import DrivenRig, OracleRig, again
+from benchmarks.diagnosis.sources import HOME, deserved
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import provenance
 from benchmarks.scoring.group import rms
 from pam_envs.constants import CELSIUS, GRAVITY
+from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE, closed_loop
 from pam_envs.diagnosis.diagnosis import diagnose
 from pam_envs.diagnosis.report.outcome import Diagnosis
 
-STAGES = ("verdict", "loop", "next")
-"""Diagnosis; controllers on the hidden rig; execution of the proposed experiment."""
+STAGES = ("verdict", "loop", "next", "oracle")
+"""Diagnosis; controllers on the hidden rig; execution of the proposed experiment; diagnosis with
+the hidden causes and the common ones alone."""
+COMMON = tuple(cause.name for cause in catalogue() if cause.common)
+"""Causes of the flexible base."""
 OUTPUTS = ("contraction", "pressure")
 MOST_RIVALS = 6
 
@@ -38,6 +43,7 @@ def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
         found = diagnosed(made.recording, made.sheet)
         spent["runtime_s"] = clock.perf_counter() - started
         record |= outcome(found) | {"traces": trace_errors(made, found)}
+        record["nature"] = deserved(made.ground.base)
         if "loop" in stages and loops(case):
             record["loop"] = loop_of(made, found)
         if "next" in stages and promised(record):
@@ -45,25 +51,45 @@ def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
             said = outcome(diagnosed(*again(case, made, plan)))
             kept = ("verdict", "names", "open", "rivals")
             record["next"] = {"plan": plan, **{key: said[key] for key in kept}}
+        if "oracle" in stages and needs_oracle(record):
+            known = outcome(diagnosed(made.recording, made.sheet, {*case.names, *COMMON}))
+            record["oracle"] = {key: known[key] for key in ("verdict", "names", "held_out")}
     except Exception as error:
+        record["unmade"] = isinstance(error, Unmade)
         record["failure"] = f"{type(error).__name__}: {error}"
     return dict(plain(record))
 
 
-def diagnosed(recording: Any, sheet: Any) -> Diagnosis:
-    """Return the diagnosis of a recording with its rig file."""
-    return diagnose(recording, rig=sheet, closed_loop=False, progress=False)
+def diagnosed(recording: Any, sheet: Any, causes: Collection[str] | None = None) -> Diagnosis:
+    """Return the diagnosis of a recording with its rig file, of all causes by default."""
+    asked = None if causes is None else sorted(causes)
+    return diagnose(recording, rig=sheet, causes=asked, closed_loop=False, progress=False)
 
 
 def loops(case: Case) -> bool:
     """Return whether controllers are compared on a case: one compensable hidden effect."""
-    return case.kind == "single" and case.names[0] in COMPENSABLE
+    return case.kind == "single" and case.world == HOME and case.names[0] in COMPENSABLE
 
 
 def promised(record: dict[str, Any]) -> bool:
-    """Return whether a record proposes an experiment that should separate its rivals."""
-    plan = record.get("experiment")
-    return record.get("verdict") == "ambiguous" and plan is not None and bool(plan["enough"])
+    """Return whether a record proposes an experiment that should separate its rivals.
+
+    An untestable cause is separated by what its recording lacks, which no further rows replace.
+    """
+    plan, testable = record.get("experiment"), record["case"]["kind"] != "untestable"
+    doubt = testable and record.get("verdict") == "ambiguous"
+    return doubt and plan is not None and bool(plan["enough"])
+
+
+def needs_oracle(record: dict[str, Any]) -> bool:
+    """Return whether a record names other causes than an oracle may, which knows the hidden ones.
+
+    With the same names the oracle is the same model.
+    """
+    hidden = set(record["case"]["names"])
+    others = set(record.get("names", ())) - {*hidden, *COMMON}
+    missing = hidden - set(record.get("names", ()))
+    return bool(hidden and record.get("verdict") == "named" and (others or missing))
 
 
 def truths_of(case: Case, made: Made) -> list[dict[str, Any]]:

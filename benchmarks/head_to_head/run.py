@@ -92,7 +92,7 @@ def diagnose(force: Array, reading: Array) -> Outcome:
     measured = reading[None]
     blocks = Blocks.make(time, measured)
     problem = Problem(family.simulate, measured, np.array([NOISE]), blocks.train, time)
-    base = fit_base(problem, blocks, family.column, family.base())
+    base = fit_base(problem, blocks, family.column, [family.base()])
     position = family.simulate(column_of(base.fit, base.fit.z)[None])[0, :, 0]
     regressors = family.regressors(position)
     decision = decide(problem, family, blocks, base, CAUSES, regressors, Rule())

@@ -11,15 +11,16 @@ name in another track has the same seeds, for paired comparison of tracks.
 
 import hashlib
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from benchmarks.identity.hashing import digest, plain
 from benchmarks.scoring.metrics import GROUPS, headline_of, of_track
+from pam_envs import yaml_file
+from pam_envs.wording import shown
 
 FOLDER = Path(__file__).parent
 _REQUIRED = {
@@ -30,7 +31,7 @@ _OPTIONAL = {
     *("kwargs", "grid", "per_reference", "model", "metrics", "gate", "half_range", "headline"),
     *("unit", "shown", *(key for group in GROUPS.values() for key in group.needs)),
 }
-MOST_SEEDS = 1000
+MOST_SEEDS = MOST_SCENARIOS = 1000
 PUBLIC_SEEDS = 899_999
 """Public seeds are from 1 to this number; those of tuning and training are above."""
 _UNITS = {"load": "kg", "mismatch": "N", "pace": "s", "payload": "kg"}
@@ -74,24 +75,32 @@ class ScenarioSet:
         given, asked = set(self.content), tuple(self.content.get("metrics") or ())
         unknown, missing = given - _REQUIRED - _OPTIONAL, _REQUIRED - given
         self._refuse_if(
-            unknown | missing, f"unknown keys {sorted(unknown)}, missing keys {sorted(missing)}"
+            unknown | missing,
+            f"unknown keys {shown(sorted(unknown))}, missing keys {sorted(missing)}",
         )
         other = sorted(set(asked) - set(GROUPS))
-        self._refuse_if(other, f"no metrics {other}; choose from {', '.join(GROUPS)}")
+        self._refuse_if(other, f"no metrics {shown(other)}; choose from {', '.join(GROUPS)}")
         for name in asked:
             lacking = sorted(set(GROUPS[name].needs) - given)
             self._refuse_if(lacking, f"the metrics {name} need {', '.join(lacking)}")
         headline, expected = headline_of(self.content), of_track(self.content)
         known = ", ".join(expected)
-        self._refuse_if(headline not in expected, f"no headline {headline!r}; choose from {known}")
+        self._refuse_if(
+            headline not in expected, f"no headline {shown(headline)}; choose from {known}"
+        )
         self._refuse_if(
             set(self.content["worst_case"]) != set(expected),
             f"worst_case needs a value for each of {known}",
         )
+        size = math.prod(map(len, (self.content.get("grid") or {}).values()))
+        self._refuse_if(
+            not 1 <= size <= MOST_SCENARIOS,
+            f"the grid has {size} scenarios; give 1 to {MOST_SCENARIOS}",
+        )
         number = self.content["seeds"]
         self._refuse_if(
             type(number) is not int or not 1 <= number <= MOST_SEEDS,
-            f"seeds must be their number, from 1 to {MOST_SEEDS}, got {number!r}",
+            f"seeds must be their number, from 1 to {MOST_SEEDS}, got {shown(number)}",
         )
 
     def _refuse_if(self, wrong: object, why: str) -> None:
@@ -160,10 +169,11 @@ def identifying(content: Mapping[str, Any]) -> dict[str, Any]:
 
 def load(path: Path) -> ScenarioSet:
     """Return the scenarios of a file; raise ValueError where one of its entries is wrong."""
-    content = yaml.safe_load(path.read_text())
+    content = yaml_file.read(path, "scenario file")
     if not isinstance(content, dict) or content.get("schema") != 1:
         raise ValueError(f"{path}: not a scenario file of schema 1")
-    made = ScenarioSet(plain(content))
+    with yaml_file.naming(str(path)):
+        made = ScenarioSet(plain(content))
     if made.name != path.stem:
         raise ValueError(f"{path}: holds {made.name!r}; name file and content alike")
     return made

@@ -14,18 +14,17 @@
 Every key but ``plant`` may be missing.
 """
 
-import contextlib
 import dataclasses
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
-import yaml
-
+from pam_envs import yaml_file
 from pam_envs.constants import BAR, MM
-from pam_envs.wording import near
+from pam_envs.wording import near, shown
 
 Load = Literal["hanging_mass", "constant_force"]
 
@@ -57,7 +56,6 @@ SECTIONS: dict[str, tuple[str, ...]] = {
     "clock": ("tolerance_ms",),
 }
 KEYS = ("plant", *SECTIONS, "load", "repeats", "valve_closed", "tolerance")
-_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,29 +129,28 @@ class Rig:
             )
         _require(
             self.load in get_args(Load),
-            f"load is {self.load!r}; choose hanging_mass or constant_force (the load in newton "
-            "belongs into the recording's column load_N)",
+            f"load is {shown(self.load)}; choose hanging_mass or constant_force (the load in "
+            "newton belongs into the recording's column load_N)",
         )
         _require(
             0 <= self.cycles_since_rest <= 1_000_000,
             f"history.cycles_since_rest = {self.cycles_since_rest} is outside [0, 1000000]; count "
             "the cycles since the muscle last rested",
         )
-        named = [label for group in self.repeats for label in group]
+        named = Counter(label for group in self.repeats for label in group)
         for group in self.repeats:
             _require(
                 len(group) >= 2,
-                f"repeats holds the group {list(group)!r}; name at least two segments that repeat "
-                "one another, or leave the group out",
+                f"repeats holds the group {shown(list(group))}; name at least two segments that "
+                "repeat one another, or leave the group out",
             )
-        for label in named:
-            once = named.count(label) == 1
-            _require(once, f"repeats names the segment {label!r} twice; name it once")
+        for label, times in named.items():
+            _require(times == 1, f"repeats names the segment {shown(label)} twice; name it once")
         for name, value in self.tolerance.items():
             _require(
                 name.count(".") == 1,
-                f"tolerance names {name!r}; name a parameter of the plant with its component, for "
-                "example mass.load",
+                f"tolerance names {shown(name)}; name a parameter of the plant with its component, "
+                "for example mass.load",
             )
             _require(
                 0.0 < value <= 1.0,
@@ -171,18 +168,11 @@ class Rig:
             Naming the file, the key, its value and what to do.
         """
         where = f"rig file {path}"
-        try:
-            data = yaml.load(Path(path).read_text(encoding="utf-8-sig"), Loader=_LOADER)
-        except OSError as error:
-            raise ValueError(f"{where} cannot be read: {error.strerror or error}") from error
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise ValueError(f"{where} is not YAML: {error}") from error
-        if not isinstance(data, Mapping):
-            raise ValueError(f"{where}: must hold a mapping with the keys {', '.join(KEYS)}")
-        try:
+        data = yaml_file.read(path, "rig file")
+        with yaml_file.naming(where):
+            if not isinstance(data, Mapping):
+                raise ValueError(f"must hold a mapping with the keys {', '.join(KEYS)}")
             return cls(**_fields(data), source=str(path))
-        except ValueError as error:
-            raise ValueError(f"{where}: {error}") from None
 
 
 def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -192,7 +182,7 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
     plant = data.get("plant")
     _require(
         isinstance(plant, str) and bool(plant.strip()),
-        f"plant is {plant!r}; name the plant's family, for example plant: single_muscle",
+        f"plant is {shown(plant)}; name the plant's family, for example plant: single_muscle",
     )
     given: dict[str, Any] = {"plant": str(plant).strip()}
     for field, bounds in NUMBERS.items():
@@ -214,7 +204,7 @@ def _refuse_unknown(data: Mapping[Any, Any], known: Sequence[str], prefix: str) 
         if key not in known:
             home = [f"{s}.{k}" for s, keys in SECTIONS.items() for k in keys if k == key]
             hint = f"; did you mean {home[0]!r}?" if home else near(str(key), known)
-            raise ValueError(f"unknown key {prefix + str(key)!r}{hint}")
+            raise ValueError(f"unknown key {shown(prefix + str(key))}{hint}")
 
 
 def _require(good: bool, message: str) -> None:
@@ -223,19 +213,17 @@ def _require(good: bool, message: str) -> None:
 
 
 def _section(value: Any, name: str, keys: tuple[str, ...]) -> Mapping[str, Any]:
-    keyed = f"{name} must be a mapping with the keys {', '.join(keys)}, got {value!r}"
+    keyed = f"{name} must be a mapping with the keys {', '.join(keys)}, got {shown(value)}"
     _require(value is None or isinstance(value, Mapping), keyed)
     _refuse_unknown(value or {}, keys, f"{name}.")
     return value or {}
 
 
 def _number(value: Any, key: str, unit: str) -> float:
-    if isinstance(value, str):  # YAML reads 1e5 without a sign as text
-        with contextlib.suppress(ValueError):
-            value = float(value)
-    good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    _require(good, f"{key} must be a number in {unit}, got {value!r}")
-    return float(value)
+    number = yaml_file.number(value)
+    if number is None:
+        raise ValueError(f"{key} must be a number in {unit}, got {shown(value)}")
+    return number
 
 
 def _history(section: Mapping[str, Any]) -> dict[str, Any]:
@@ -246,7 +234,7 @@ def _history(section: Mapping[str, Any]) -> dict[str, Any]:
         ("settled", bool, "true or false"),
     ):
         good = key not in given or type(given[key]) is kind
-        _require(good, f"history.{key} must be {what}, got {given.get(key)!r}")
+        _require(good, f"history.{key} must be {what}, got {shown(given.get(key))}")
     return given
 
 
@@ -254,7 +242,7 @@ def _labels(value: Any, key: str) -> tuple[str, ...]:
     """Return segment labels; YAML makes numbers of those that look like numbers."""
     labels = [] if value is None else value
     good = isinstance(labels, list) and all(type(v) in (str, int, float) for v in labels)
-    _require(good, f"{key} must be a list of segments, for example [holds_a], got {value!r}")
+    _require(good, f"{key} must be a list of segments, for example [holds_a], got {shown(value)}")
     return tuple(str(label).strip() for label in labels)
 
 
@@ -262,7 +250,7 @@ def _repeats(value: Any) -> tuple[tuple[str, ...], ...]:
     _require(
         value is None or isinstance(value, list),
         "repeats must be a list of groups of segments, for example [[holds_a, holds_b]], got "
-        f"{value!r}",
+        f"{shown(value)}",
     )
     return tuple(_labels(group, "each group of repeats") for group in value or [])
 
@@ -271,7 +259,7 @@ def _tolerance(value: Any) -> dict[str, float]:
     _require(
         value is None or isinstance(value, Mapping),
         "tolerance must be a mapping from parameter to relative error, for example "
-        f"{{mass.load: 0.02}}, got {value!r}",
+        f"{{mass.load: 0.02}}, got {shown(value)}",
     )
     given = (value or {}).items()
     return {str(k): _number(v, f"tolerance of {k}", "parts of one") for k, v in given}

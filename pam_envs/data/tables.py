@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 from pam_envs.arrays import Array
 from pam_envs.constants import BAR, MM
 from pam_envs.data.recording.columns import RecordingError, Sheet, read_sheet, refuse, rows_text
+from pam_envs.wording import shown
 
 LOAD_TOLERANCE = 1e-6
 """Two loads [kg] closer than this are the same load."""
 READINGS = ("load_kg", "pressure_bar", "direction", "repeat", "contraction_mm")
 """The columns of a table of settled readings."""
+MOST_READINGS = 20_000
 UP = ("inflating", "inflation", "up")
 DOWN = ("deflating", "deflation", "down")
 BOUNDS = {
@@ -150,6 +152,8 @@ def load_readings(path: str | Path) -> ContractionTable:
     """
     required = [name for name in READINGS if name != "repeat"]
     sheet = read_sheet(path, READINGS, required, "a table of readings")
+    if len(sheet.rows) > MOST_READINGS:
+        refuse(sheet.where, f"there are {len(sheet.rows)} readings; give at most {MOST_READINGS}")
     numbers = _numbers(sheet)
     inflating = _directions(sheet)
     order = np.lexsort((numbers["repeat"], numbers["load_kg"]))
@@ -240,7 +244,7 @@ def _directions(sheet: Sheet) -> NDArray[np.bool_]:
     if wrong:
         refuse(
             sheet.where,
-            f"column direction holds {words[wrong[0]]!r} and the like in "
+            f"column direction holds {shown(words[wrong[0]])} and the like in "
             f"{rows_text(sheet.rows[wrong])}; write inflating or deflating (or up, down)",
         )
     return np.array([word in UP for word in words], dtype=bool)

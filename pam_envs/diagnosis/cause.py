@@ -49,9 +49,14 @@ class Form:
         return [t.starts[min(k, len(t.starts) - 1)] for t in self.terms]
 
     @property
+    def starts(self) -> list[tuple[float, ...]]:
+        """Starting points by the terms."""
+        return [tuple(self.start(k)) for k in range(max(len(t.starts) for t in self.terms))]
+
+    @property
     def trials(self) -> int:
         """Number of starting points among which the best is selected."""
-        own = max(len(t.starts) for t in self.terms)
+        own = len(self.starts)
         return int(getattr(self.search, "trials", own)) if self.search is not None else own
 
 

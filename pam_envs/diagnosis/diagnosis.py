@@ -308,7 +308,7 @@ class Study:
             for shape in self.problem.shapes:
                 rows = np.zeros(self.problem.measured.shape)
                 rows[k] = shape
-                made.append(rows.ravel()[self.problem.order])
+                made.append(self.problem.vectors(rows.reshape(1, -1))[0])
         stacked = np.vstack([base_subspace(self.normal.fit), *made])
         return np.asarray(np.linalg.qr(stacked.T)[0].T)
 

@@ -10,6 +10,17 @@ import numpy as np
 from pam_envs.export.model import Block, Model, Variable
 from pam_envs.export.toolchain import OBJECTS, emit_object, host_platform
 
+_STEP = {
+    "environment": "Apply inputs for one control period.",
+    "plant": "Apply inputs for one control period.",
+    "controller": "Compute the actions for an observation, once in a control period.",
+}
+SUBJECT = {
+    "environment": "physics, compiled from the\nkernels that run in Python",
+    "plant": "physics, compiled from the\nkernels that run in Python",
+    "controller": "control law",
+}
+"""Content of the object code, by kind of model."""
 _TYPES = {"float64": "double", "float32": "float", "int64": "int64_t", "int8": "int8_t"}
 
 
@@ -48,7 +59,13 @@ void {p}_reset({p} *model, uint64_t seed);
 /* Start the next episode of the seed. */
 void {p}_next_episode({p} *model);"""
     else:
-        begin = f"""/* Bring the plant to rest under its inputs. */
+        what = (
+            "Begin an episode; the outputs are the actions for its first observation, which\n"
+            " * the first step takes again."
+            if model.kind == "controller"
+            else "Bring the plant to rest under its inputs."
+        )
+        begin = f"""/* {what} */
 void {p}_reset({p} *model, const double *inputs);"""
     return f"""/* {model.title}, exported from the kernels of pam-envs. All quantities are SI.
  *
@@ -73,7 +90,7 @@ typedef struct {p} {{
 /* Set the parameters to their defaults; call it first. */
 void {p}_init({p} *model);
 {begin}
-/* Apply inputs for one control period. */
+/* {_STEP[model.kind]} */
 void {p}_step({p} *model, const double *inputs);
 /* Return an output of the last step, or of the start. */
 double {p}_output(const {p} *model, int output);
@@ -96,9 +113,7 @@ def _enum(p: str, group: str, variables: Sequence[Variable]) -> str:
     lines = []
     for k, variable in enumerate(variables):
         unit = "" if variable.unit == "1" else f" [{variable.unit}]"
-        span = ""
-        if variable.low is not None:
-            span = f", {variable.low:g} .. {variable.high:g}"
+        span = f", {variable.span}" if variable.span else ""
         start = f", default {variable.start:g}" if group == "parameter" else ""
         lines.append(
             f"    {first}_{variable.word.upper()} = {k}, /* {variable.name}{unit}{span}{start} */"
@@ -314,10 +329,12 @@ def example(model: Model) -> str:
     p, n = model.prefix, len(model.inputs)
     begin = "reset(&model, 17);" if model.episodic else "reset(&model, inputs);"
     starts = _wrapped(literal(np.float64(v.start)) for v in model.inputs)
+    acts = model.kind == "controller"
+    shown = "each step" if acts else "the start and of\n * each step"
     return f"""/* Runs {model.title}.
  *
- * example SEED < inputs: a line of inputs is one control period; prints every output of the start
- * and of each step, as hexadecimal numbers, which show every bit.
+ * example SEED < inputs: a line of inputs is one control period; prints every output of {shown},
+ * as hexadecimal numbers, which show every bit.
  * example SEED STEPS: constant inputs; prints the outputs of the last step.
  */
 #include <stdio.h>
@@ -348,11 +365,12 @@ int main(int count, char **words) {{
         return 0;
     }}
     for (;;) {{
-        print();
+        {"" if acts else "print();"}
         for (int k = 0; k < {n}; k++)
             if (scanf("%lf", inputs + k) != 1)
                 return 0;
         {p}_step(&model, inputs);
+        {"print();" if acts else ""}
     }}
 }}
 """
@@ -362,33 +380,35 @@ def readme(model: Model) -> str:
     """Return the page of a folder with C."""
     here = host_platform()
     link = f"objects/{here}/{model.name}_kernel.o"
+    changed = f"""Parameters are changed between `{model.prefix}_init` and `{model.prefix}_reset`.
+pam-envs checks their bounds; the C code does not.
+
+"""
+    changed = changed if model.parameters else ""
     return f"""# {model.title} in C
 
 `{model.name}.h` names inputs, outputs and parameters, with units (SI). `{model.name}.c` holds the
-data; `objects/PROCESSOR/{model.name}_kernel.o` the physics, compiled from the same kernels that
-run in Python. Nothing else is needed: no Python, no libm, no memory allocation.
+data; `objects/PROCESSOR/{model.name}_kernel.o` the {SUBJECT[model.kind]}.
+Nothing else is needed: no Python, no libm, no memory allocation.
 
     cc -O2 example.c {model.name}.c {link} -o example
     ./example 17 1000
 
-prints every output after 1,000 steps with constant inputs, equal to those of pam-envs to the last
-bit.
+prints every output after 1,000 steps with constant inputs. Outputs are {model.agreement}.
 
-Parameters are changed between `{model.prefix}_init` and `{model.prefix}_reset`. pam-envs checks
-their bounds; the C code does not.
-
-{readme_body(model)}"""
+{changed}{readme_body(model)}"""
 
 
 def readme_body(model: Model) -> str:
     """Return facts, inputs, outputs and parameters of a model in Markdown."""
     facts = "\n".join(f"- {line}" for line in model.lines)
+    note = """A parameter changes the plant alone: what an environment derives from its nominal
+plant stays as exported. Parameters of effects that are switched off are left out.
+
+"""
     return f"""{facts}
 
-A parameter changes the plant alone: what an environment derives from its nominal plant stays as
-exported. Parameters of effects that are switched off are left out.
-
-{table("Inputs", model.inputs)}
+{note if model.parameters else ""}{table("Inputs", model.inputs)}
 {table("Outputs", model.outputs)}
 {table("Parameters", model.parameters)}"""
 
@@ -399,6 +419,5 @@ def table(title: str, variables: Sequence[Variable]) -> str:
         return ""
     lines = [f"## {title}", "", "| # | name | unit | range |", "|---|---|---|---|"]
     for k, v in enumerate(variables):
-        span = "" if v.low is None else f"{v.low:g} .. {v.high:g}"
-        lines.append(f"| {k} | `{v.name}` | {v.unit} | {span} |")
+        lines.append(f"| {k} | `{v.name}` | {v.unit} | {v.span} |")
     return "\n".join(lines) + "\n"

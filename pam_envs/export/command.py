@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium as gym
-import yaml
 
-from pam_envs.wording import near
+from pam_envs import yaml_file
+from pam_envs.wording import near, shown
 
 if TYPE_CHECKING:
     from pam_envs.export.model import Model
@@ -36,9 +36,14 @@ def model_of(
     si: bool = False,
 ) -> Model:
     """Return the model of an environment or of a plant (arguments as of ``pam-envs export``)."""
+    from pam_envs.export import actuator
     from pam_envs.export.environment import environment_model
     from pam_envs.export.plant import plant_model
 
+    if what == actuator.NAME:
+        if hysteresis or air or reference:
+            raise ValueError("a muscle takes --plant alone; give its hysteresis in the plant file")
+        return actuator.muscle_model(plant_of("single_muscle" if plant is None else str(plant)))
     if what.endswith((".yaml", ".yml")) or what in PLANTS:
         extra = {"plant": plant, "hysteresis": hysteresis, "air": air, "reference": reference}
         for name, value in extra.items():
@@ -67,13 +72,12 @@ def plant_of(what: str) -> Any:
         name, constructor = PLANTS[what]
         return getattr(getattr(plants, name), constructor)()
     path = Path(what)
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as error:
-        raise ValueError(f"plant file {path} cannot be read: {error}") from error
+    data = yaml_file.read(path, "plant file")
     family = data.get("family") if isinstance(data, dict) else None
-    if family not in PLANTS:
-        raise ValueError(f"plant file {path}: family is {family!r}; known: {', '.join(PLANTS)}")
+    if not isinstance(family, str) or family not in PLANTS:
+        raise ValueError(
+            f"plant file {path}: family is {shown(family)}; known: {', '.join(PLANTS)}"
+        )
     return getattr(plants, PLANTS[family][0]).from_yaml(path)
 
 
@@ -86,7 +90,7 @@ def registered(what: str) -> str:
         return found[0] if found else short[what]
     raise ValueError(
         f"no environment or plant named {what!r}{near(what, [*short, *PLANTS])}; plants are: "
-        f"{', '.join(PLANTS)}, or a plant file (.yaml)"
+        f"{', '.join(PLANTS)}, a muscle with imposed length, or a plant file (.yaml)"
     )
 
 

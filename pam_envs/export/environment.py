@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from pam_envs.envs.core.setup import Setup
-from pam_envs.envs.core.step import CHOICE, N_ARRAYS, seed_by_address
-from pam_envs.export.model import Block, Model, Variable, parameters_of, snake
+from pam_envs.envs.core.step import CHOICE, FIRST_CHOICE, N_ARRAYS, seed_by_address
+from pam_envs.export.model import Block, Model, Variable, parameters_of, signal_variables, snake
 from pam_envs.export.units import unit_of
 from pam_envs.kernels.machine_code import AddressKernel
 
@@ -69,7 +69,7 @@ def environment_model(env_id: str, env: Any) -> Model:
     if family == "elbow":
         own["command"] = actions[0].unit
     outputs = [
-        *(Variable(f"observation.{s.name}", _shown(s), "observation", s.index) for s in signals),
+        *signal_variables(signals, "observation", "observation."),
         Variable("reward", "1", "report", 0),
         *(
             Variable(f"info.{k}", unit_of(k, family, own), "report", i + 1)
@@ -78,13 +78,21 @@ def environment_model(env_id: str, env: Any) -> Model:
         Variable("terminated", "1", "flags", 0),
         Variable("truncated", "1", "flags", 1),
     ]
-    inputs = [Variable(s.name, _shown(s), "action", s.index, 0.0, *_bounds(s)) for s in actions]
+    inputs = signal_variables(actions, "action")
     at = [int(choices[CHOICE.at_members]) * settings.shape[1], int(choices[CHOICE.members])]
     parameters = (
         parameters_of(setup.plant, setup.fixed_parameters, "settings", at[0])
         if at[1] == 1 and not setup.drawn
         else []
     )
+    if family == "positioning" and choices[FIRST_CHOICE] == 1:  # one load, not several to draw from
+        load, row = signals["load"], int(choices[CHOICE.at_own])
+        parameters.append(
+            Variable(
+                "load", load.unit, "settings", row * settings.shape[1], float(settings[row, 0]),
+                load.low, load.high, "load that hangs at the start",
+            )
+        )  # fmt: skip
     return Model(
         env_id,
         snake(env_id.rpartition("/")[2]),
@@ -94,19 +102,10 @@ def environment_model(env_id: str, env: Any) -> Model:
         tuple(inputs),
         tuple(outputs),
         tuple(parameters),
-        True,
+        "environment",
         {"environment": env_id, "plant": f"{setup.plant.family}, digest {setup.plant.digest()}"},
     )
 
 
 def _unit(signals: Any, name: str) -> str:
     return next((s.unit for s in signals if s.name.startswith(name)), "1")
-
-
-def _shown(signal: Any) -> str:
-    """Return the unit of a signal's entry in its vector: a pure number if it is scaled."""
-    return "1" if signal.normalized else str(signal.unit)
-
-
-def _bounds(signal: Any) -> tuple[float, float]:
-    return (-1.0, 1.0) if signal.normalized else (signal.low, signal.high)

@@ -4,8 +4,9 @@ import html
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 from pam_envs.export.c import literal, readme_body, write_sources
@@ -59,7 +60,7 @@ def export_fmu(model: Model, folder: Path, platforms: Iterable[str] = ()) -> Non
         place = Path(work)
         write_sources(model, place)
         (place / "fmi_model.h").write_text(fmi_header(model), encoding="utf-8")
-        for name in ("component.h", "fmi2.c", "fmi3.c"):
+        for name in ("component.h", "instance.h", "fmi2.c", "fmi3.c"):
             (place / name).write_text((_FMI / name).read_text(encoding="utf-8"), encoding="utf-8")
         binaries = {platform: _link(model, place, platform) for platform in every}
     page = documentation(model)
@@ -139,18 +140,37 @@ def dotted(variable: Variable) -> str:
     return variable.name.replace("/", ".")
 
 
+class Declared(NamedTuple):
+    """A variable of a model description.
+
+    ``kind`` is "number", "flag" or "seed"; ``variable`` has unit and bounds, None for the seed.
+    """
+
+    name: str
+    reference: int
+    kind: str
+    causality: str
+    variability: str
+    variable: Variable | None = None
+
+
+def declared(model: Model) -> Iterator[Declared]:
+    """Yield inputs, outputs, parameters and the seed of a model."""
+    for k, v in enumerate(model.inputs):
+        yield Declared(f"input.{dotted(v)}", 1 + k, "number", "input", "continuous", v)
+    for k, v in enumerate(model.outputs):
+        kind, variability = ("flag", "discrete") if _flag(v) else ("number", "continuous")
+        yield Declared(dotted(v), OUTPUT + k, kind, "output", variability, v)
+    for k, v in enumerate(model.parameters):
+        name = f"parameter.{dotted(v)}"
+        yield Declared(name, PARAMETER + k, "number", "parameter", "fixed", v)
+    if model.episodic:
+        yield Declared("seed", SEED, "seed", "parameter", "fixed")
+
+
 def description3(model: Model) -> str:
     """Return ``modelDescription.xml`` of FMI 3.0."""
-    root = ElementTree.Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=model.name,
-        instantiationToken=token(model),
-        description=model.title,
-        version=model.digest[:16],
-        generationTool="pam-envs",
-        variableNamingConvention="structured",
-    )
+    root = _root(model, "3.0", instantiationToken=token(model))
     ElementTree.SubElement(
         root,
         "CoSimulation",
@@ -167,23 +187,12 @@ def description3(model: Model) -> str:
         variables, "Float64", name="time", valueReference="0", causality="independent",
         variability="continuous", unit="s",
     )  # fmt: skip
-    for k, v in enumerate(model.inputs):
-        _float(variables, f"input.{dotted(v)}", 1 + k, v, "input", "continuous")
-    for k, v in enumerate(model.outputs):
-        if _flag(v):
-            ElementTree.SubElement(
-                variables, "Boolean", name=dotted(v), valueReference=str(OUTPUT + k),
-                causality="output", variability="discrete", initial="calculated",
-            )  # fmt: skip
-        else:
-            _float(variables, dotted(v), OUTPUT + k, v, "output", "continuous")
-    for k, v in enumerate(model.parameters):
-        _float(variables, f"parameter.{dotted(v)}", PARAMETER + k, v, "parameter", "fixed")
-    if model.episodic:
-        ElementTree.SubElement(
-            variables, "Int64", name="seed", valueReference=str(SEED), causality="parameter",
-            variability="fixed", start="0", min="0", description="seed of the episode",
-        )  # fmt: skip
+    types = {"number": "Float64", "flag": "Boolean", "seed": "Int64"}
+    for d in declared(model):
+        made = _variable(variables, types[d.kind], d)
+        if d.causality == "output":
+            made.set("initial", "calculated")
+        _describe(made, made, d)
     structure = ElementTree.SubElement(root, "ModelStructure")
     for kind in ("Output", "InitialUnknown"):
         for k in range(len(model.outputs)):
@@ -193,16 +202,7 @@ def description3(model: Model) -> str:
 
 def description2(model: Model) -> str:
     """Return ``modelDescription.xml`` of FMI 2.0."""
-    root = ElementTree.Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=model.name,
-        guid=token(model),
-        description=model.title,
-        version=model.digest[:16],
-        generationTool="pam-envs",
-        variableNamingConvention="structured",
-    )
+    root = _root(model, "2.0", guid=token(model))
     ElementTree.SubElement(
         root,
         "CoSimulation",
@@ -214,30 +214,13 @@ def description2(model: Model) -> str:
     _units(model, root)
     _experiment(model, root)
     variables = ElementTree.SubElement(root, "ModelVariables")
-
-    def scalar(name: str, reference: int, causality: str, variability: str) -> ElementTree.Element:
-        made = ElementTree.SubElement(
-            variables, "ScalarVariable", name=name, valueReference=str(reference),
-            causality=causality, variability=variability,
-        )  # fmt: skip
-        initial = {"output": "calculated", "parameter": "exact"}
-        if causality in initial:
-            made.set("initial", initial[causality])
-        return made
-
-    for k, v in enumerate(model.inputs):
-        _real(scalar(f"input.{dotted(v)}", 1 + k, "input", "continuous"), v, True)
-    for k, v in enumerate(model.outputs):
-        if _flag(v):
-            made = scalar(dotted(v), OUTPUT + k, "output", "discrete")
-            ElementTree.SubElement(made, "Boolean")
-        else:
-            _real(scalar(dotted(v), OUTPUT + k, "output", "continuous"), v, False)
-    for k, v in enumerate(model.parameters):
-        _real(scalar(f"parameter.{dotted(v)}", PARAMETER + k, "parameter", "fixed"), v, True)
-    if model.episodic:
-        seed = scalar("seed", SEED, "parameter", "fixed")
-        ElementTree.SubElement(seed, "Integer", start="0", min="0")
+    types = {"number": "Real", "flag": "Boolean", "seed": "Integer"}
+    initial = {"output": "calculated", "parameter": "exact"}
+    for d in declared(model):
+        made = _variable(variables, "ScalarVariable", d)
+        if d.causality in initial:
+            made.set("initial", initial[d.causality])
+        _describe(made, ElementTree.SubElement(made, types[d.kind]), d)
     structure = ElementTree.SubElement(root, "ModelStructure")
     first = 1 + len(model.inputs)
     for kind in ("Outputs", "InitialUnknowns"):
@@ -247,38 +230,48 @@ def description2(model: Model) -> str:
     return _text(root)
 
 
+def _root(model: Model, version: str, **identity: str) -> ElementTree.Element:
+    return ElementTree.Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": version,
+            "modelName": model.name,
+            **identity,
+            "description": model.title,
+            "version": model.digest[:16],
+            "generationTool": "pam-envs",
+            "variableNamingConvention": "structured",
+        },
+    )
+
+
+def _variable(parent: ElementTree.Element, tag: str, d: Declared) -> ElementTree.Element:
+    return ElementTree.SubElement(
+        parent, tag, name=d.name, valueReference=str(d.reference), causality=d.causality,
+        variability=d.variability,
+    )  # fmt: skip
+
+
+def _describe(outer: ElementTree.Element, typed: ElementTree.Element, d: Declared) -> None:
+    """Set description, unit, bounds and start value; FMI 2.0 has all but the first in ``typed``."""
+    v = d.variable
+    if v is None:
+        outer.set("description", "seed of the episode")
+        typed.set("start", "0")
+        typed.set("min", "0")
+    elif d.kind == "number":
+        if v.text or v.meant:
+            outer.set("description", v.text or f"-1 .. 1 for {v.meant}")
+        typed.set("unit", v.unit)
+        if v.low is not None and v.high is not None:
+            typed.set("min", repr(float(v.low)))
+            typed.set("max", repr(float(v.high)))
+        if d.causality != "output":
+            typed.set("start", repr(float(v.start)))
+
+
 def _flag(variable: Variable) -> bool:
     return variable.block == "flags"
-
-
-def _set_spans(made: ElementTree.Element, v: Variable, start: bool) -> None:
-    """Set unit, bounds and start value of a number."""
-    made.set("unit", v.unit)
-    if v.low is not None and v.high is not None:
-        made.set("min", repr(float(v.low)))
-        made.set("max", repr(float(v.high)))
-    if start:
-        made.set("start", repr(float(v.start)))
-
-
-def _float(
-    parent: ElementTree.Element, name: str, reference: int, v: Variable, causality: str, how: str
-) -> None:
-    made = ElementTree.SubElement(
-        parent, "Float64", name=name, valueReference=str(reference), causality=causality,
-        variability=how,
-    )  # fmt: skip
-    if causality == "output":
-        made.set("initial", "calculated")
-    if v.text:
-        made.set("description", v.text)
-    _set_spans(made, v, causality != "output")
-
-
-def _real(parent: ElementTree.Element, v: Variable, start: bool) -> None:
-    if v.text:
-        parent.set("description", v.text)
-    _set_spans(ElementTree.SubElement(parent, "Real"), v, start)
 
 
 def _units(model: Model, root: ElementTree.Element) -> None:

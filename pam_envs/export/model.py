@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,16 @@ class Variable:
     low: float | None = None
     high: float | None = None
     text: str = ""
+    meant: str = ""
+    """Range in SI of an entry that is scaled to -1 .. 1."""
+
+    @property
+    def span(self) -> str:
+        """Range in words, empty if there is none."""
+        if self.low is None:
+            return ""
+        meant = f" for {self.meant}" if self.meant else ""
+        return f"{self.low:g} .. {self.high:g}{meant}"
 
     @property
     def word(self) -> str:
@@ -49,7 +59,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Model:
-    """An environment or a plant as one state, kernels and named variables.
+    """An environment, a plant or a controller as one state, kernels and named variables.
 
     Attributes
     ----------
@@ -63,8 +73,11 @@ class Model:
         Source of each kernel, by the suffix of its function.
     inputs, outputs, parameters : tuple of Variable
         Outputs in groups: their names begin with the group and a dot.
-    episodic : bool
-        Whether it has seeds and episodes: an environment.
+    kind : {"environment", "plant", "controller"}
+        An environment has seeds and episodes. Inputs of a controller are an observation, its
+        output is an action.
+    agreement : str
+        How its outputs compare with those of the package, for the documentation.
     facts : mapping
         Further lines for the documentation.
     """
@@ -77,8 +90,14 @@ class Model:
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
     parameters: tuple[Variable, ...]
-    episodic: bool
+    kind: Literal["environment", "plant", "controller"]
     facts: Mapping[str, str] = field(default_factory=dict)
+    agreement: str = "equal to those of pam-envs to the last bit"
+
+    @property
+    def episodic(self) -> bool:
+        """Whether it has seeds and episodes."""
+        return self.kind == "environment"
 
     @property
     def prefix(self) -> str:
@@ -124,6 +143,22 @@ class Model:
             "made by": package(),
         }
         return [f"{name}: {text}" for name, text in facts.items()]
+
+
+def signal_variables(signals: Any, block: str, prefix: str = "") -> list[Variable]:
+    """Return the entries of an observation or action in a block, in their order.
+
+    An entry that is scaled to [-1, 1] is a pure number.
+    """
+    found = []
+    for s in signals:
+        unit, low, high, meant = str(s.unit), s.low, s.high, ""
+        if s.normalized:
+            meant = f"{low:g} .. {high:g}{'' if unit == '1' else f' {unit}'}"
+            unit, low, high = "1", -1.0, 1.0
+        name = f"{prefix}{s.name}"
+        found.append(Variable(name, unit, block, s.index, 0.0, low, high, meant=meant))
+    return found
 
 
 def identifier(name: str) -> str:

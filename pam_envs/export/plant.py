@@ -71,6 +71,6 @@ def plant_model(plant: Any) -> Model:
             for k, name in enumerate(names)
         ),
         tuple(parameters_of(plant, (), "fixed", 0)),
-        False,
+        "plant",
         {"plant": f"{family}, digest {plant.digest()}"},
     )

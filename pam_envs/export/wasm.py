@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from pam_envs.export.c import readme_body, write_sources
 from pam_envs.export.model import Model, Variable
@@ -146,79 +147,41 @@ uint32_t state_size(void) {{
 """
 
 
+def description(model: Model) -> dict[str, Any]:
+    """Return what the JavaScript class needs to know of a model, as plain values."""
+
+    def listed(variables: Sequence[Variable]) -> list[dict[str, Any]]:
+        words = ("name", "unit", "start", "low", "high")
+        return [{word: getattr(v, word) for word in words} for v in variables]
+
+    return {
+        "digest": model.digest,
+        "period": model.period,
+        "inputs": listed(model.inputs),
+        "outputs": listed(model.outputs),
+        "parameters": listed(model.parameters),
+    }
+
+
+INSTANCE = (Path(__file__).parent / "instance.js").read_text(encoding="utf-8")
+"""JavaScript class of an instance of a module."""
+
+
 def script(model: Model) -> str:
     """Return the JavaScript module."""
-
-    def listed(variables: Sequence[Variable]) -> str:
-        words = ("name", "unit", "start", "low", "high")
-        return json.dumps([{word: getattr(v, word) for word in words} for v in variables], indent=1)
-
+    exported = "\n".join(
+        f"export const {name} = {json.dumps(value, indent=1)};{' // s' if name == 'period' else ''}"
+        for name, value in description(model).items()
+    )
     return f"""// {model.title}, exported from the kernels of pam-envs. All quantities are SI.
-// digest: {model.digest}
-export const digest = "{model.digest}";
-export const period = {model.period!r}; // s
-export const inputs = {listed(model.inputs)};
-export const outputs = {listed(model.outputs)};
-export const parameters = {listed(model.parameters)};
+{exported}
 
-export class Model {{
+{INSTANCE}
+export class Model extends Instance {{
   // source: the bytes of {model.name}.wasm, or a WebAssembly.Module
   static async create(source) {{
     const made = source instanceof WebAssembly.Module ? source : await WebAssembly.compile(source);
-    return new Model(await WebAssembly.instantiate(made, {{}}));
-  }}
-
-  constructor(instance) {{
-    this.wasm = instance.exports;
-    this.wasm.init();
-    const memory = this.wasm.memory.buffer;
-    this.inputs = new Float64Array(memory, this.wasm.inputs(), inputs.length);
-    this.outputs = new Float64Array(memory, this.wasm.outputs(), outputs.length);
-    this.parameters = new Float64Array(memory, this.wasm.parameters(), parameters.length);
-    this.memory = new Uint8Array(memory, this.wasm.state(), this.wasm.state_size());
-  }}
-
-  // Change a parameter by name; the next reset reads it.
-  set(name, value) {{
-    const k = parameters.findIndex((p) => p.name === name);
-    if (k < 0) throw new RangeError(`there is no parameter named ${{name}}`);
-    const {{ low, high, unit }} = parameters[k];
-    if (!(value >= low && value <= high))
-      throw new RangeError(`${{name}} = ${{value}} must be from ${{low}} to ${{high}} ${{unit}}`);
-    this.parameters[k] = value;
-  }}
-
-  // Start episode 0 of a seed (a plant has no seeds: it comes to rest under its inputs).
-  reset(seed = 0) {{
-    this.wasm.reset(seed >>> 0, Math.floor(seed / 4294967296));
-    return this.outputs;
-  }}
-
-  nextEpisode() {{
-    this.wasm.next_episode();
-    return this.outputs;
-  }}
-
-  // Apply inputs for one control period.
-  step(values) {{
-    this.inputs.set(values);
-    this.wasm.step();
-    return this.outputs;
-  }}
-
-  // Return an output of the last step by name.
-  get(name) {{
-    const k = outputs.findIndex((o) => o.name === name);
-    if (k < 0) throw new RangeError(`there is no output named ${{name}}`);
-    return this.outputs[k];
-  }}
-
-  save() {{
-    return this.memory.slice();
-  }}
-
-  restore(saved) {{
-    this.memory.set(saved);
+    return new Model(await WebAssembly.instantiate(made, {{}}), {{ inputs, outputs, parameters }});
   }}
 }}
 """
@@ -259,8 +222,7 @@ def readme(model: Model) -> str:
     return f"""# {model.title} in WebAssembly
 
 `{model.name}.wasm` imports nothing. `{model.name}.mjs` has the class `Model` with named inputs,
-outputs and parameters; it runs in browsers and in Node. Outputs are those of pam-envs to the last
-bit.
+outputs and parameters; it runs in browsers and in Node. Outputs are {model.agreement}.
 
     node example.mjs 17 1000
 

@@ -1,4 +1,4 @@
-"""Creep of a muscle and effects on its friction: small loops, pressure dependence, first cycles.
+"""Creep of a muscle and effects on its friction: loops, pressure dependence, first cycles.
 
 Creep: four Kelvin-Voigt elements that follow a quantity with time constants of their own. The creep
 of ``x`` is ``sum_k c_k y_k`` with ``T_k y_k' = x - y_k``. Applied to the effective pressure the
@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import kernel
+from pam_envs.kernels.yielding import yielded
 from pam_envs.parameters import assumed, effect
 
 ELEMENTS = 4
@@ -91,6 +92,33 @@ class FrictionEffects:
     shape: float = assumed(1.0, "1", 0.01, 100.0, "slope of small loops over plays'", neutral=1.0)
     pressure_slope: float = effect("1", -2.0, 20.0, "friction gained up to full pressure, linear")
     pressure_bend: float = effect("1", -20.0, 20.0, "friction gained with pressure squared")
+
+
+@dataclass(frozen=True, kw_only=True)
+class YieldEffects:
+    """Friction of the pressure that yields smoothly (:mod:`pam_envs.kernels.yielding`)."""
+
+    yield_width: float = effect("Pa", 0.0, 2e5, "effective pressure lost at full yield")
+    yield_break: float = assumed(2e4, "Pa", 1e2, 1e6, "pressure over which it yields")
+    yield_ratio: float = assumed(
+        0.5, "1", 0.0, 1.0, "0: springs back after a reversal, 1: friction of Dahl"
+    )
+
+
+@kernel
+def yield_step(
+    rows: Any, fixed: Any, state: int, width: int, first: int, last: int, pressure: Any
+) -> None:
+    """Move the yielding friction of lanes ``first`` to ``last`` to a pressure [Pa].
+
+    ``state`` is the row of its share of full yield; the next row is the pressure before. ``width``
+    is the first row of :class:`YieldEffects`.
+    """
+    share, before = rows[state], rows[state + 1]
+    for j in range(first, last):
+        moved = (pressure[j] - before[j]) / fixed[width + 1][j]
+        share[j] = yielded(share[j], moved, fixed[width + 2][j])[0]
+        before[j] = pressure[j]
 
 
 @dataclass(frozen=True, kw_only=True)

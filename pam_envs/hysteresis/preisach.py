@@ -85,6 +85,7 @@ class Preisach(HysteresisModel):
     kind: ClassVar[str] = "preisach"
     kernels: ClassVar[Kernels] = Kernels(relays_step, peek=relays_peek, begin=relays_begin)
     state_rows: ClassVar[int] = STATE_ROWS
+    largest_count: ClassVar[int] = DEPTH
 
     low: float
     high: float

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.arrays import Array
 from pam_envs.kernels.build import LANES, kernel, scratch
+from pam_envs.wording import shown
 
 Start = Literal["low", "virgin"]
 RowsState = tuple[NDArray[Any], ...]
@@ -180,6 +181,8 @@ class HysteresisModel:
     kernels: ClassVar[Kernels]
     state_rows: ClassVar[int]
     """Rows of state of one operator."""
+    largest_count: ClassVar[int] = 1
+    """Largest value of the operator's row of ``counts``."""
 
     @property
     def elements(self) -> int:
@@ -405,16 +408,17 @@ def read(record: Any, where: str) -> HysteresisModel | None:
     Raises ValueError if the kind is unknown, a key is missing or unknown, or a value is out of
     bounds.
     """
-    if not isinstance(record, Mapping) or record.get("kind") not in MODELS:
+    if not isinstance(record, Mapping) or str(record.get("kind")) not in MODELS:
         raise ValueError(
-            f"{where}: hysteresis must be a mapping with kind {', '.join(MODELS)}, got {record!r}"
+            f"{where}: hysteresis must be a mapping with kind {', '.join(MODELS)}, "
+            f"got {shown(record)}"
         )
     model = MODELS[record["kind"]]
     given = {key: value for key, value in record.items() if key != "kind"}
     if set(given) - set(model.optional()) != set(model.keys()):
         raise ValueError(
             f"{where}: a {model.kind} hysteresis needs exactly the keys {sorted(model.keys())}, "
-            f"got {sorted(given)}"
+            f"got {shown(sorted(map(str, given)))}"
         )
     try:
         made = model.from_record(given)

@@ -6,7 +6,7 @@ import pickle
 import sys
 
 from pam_envs.kernels import emission, intermediate
-from pam_envs.kernels.cache import FOLDER, write_whole
+from pam_envs.kernels.cache import FOLDER, make_folder, read_whole, write_whole
 from pam_envs.kernels.machine_code import BUSY, Source, is_busy
 
 
@@ -16,7 +16,7 @@ def main() -> int:
         os.nice(10)
     source: Source = pickle.load(sys.stdin.buffer)
     kernel = source.by_address
-    FOLDER.mkdir(parents=True, exist_ok=True)
+    make_folder(FOLDER)
     if not is_busy(kernel.busy_file):
         kernel.busy_file.unlink(missing_ok=True)
     try:
@@ -24,8 +24,9 @@ def main() -> int:
     except FileExistsError:
         return BUSY
     try:
-        if kernel.ir_file.exists():
-            text = lzma.decompress(kernel.ir_file.read_bytes()).decode()
+        packed = read_whole(kernel.ir_file)
+        if packed is not None:
+            text = lzma.decompress(packed).decode()
         else:
             text = intermediate.intermediate(kernel.function, kernel.names, kernel.words)
             write_whole(kernel.ir_file, lzma.compress(text.encode(), preset=6))

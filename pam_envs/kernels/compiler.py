@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import pickle
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +14,7 @@ from numba.core.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
 from pam_envs.kernels import rebind
-from pam_envs.kernels.cache import FOLDER
+from pam_envs.kernels.cache import FOLDER, complain, make_folder, read_whole, write_whole
 from pam_envs.kernels.notice import Notice
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
@@ -47,7 +48,7 @@ class _Locator(caching._CacheLocator):
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
         """Return a locator, or None where nothing can be written."""
         try:
-            FOLDER.mkdir(parents=True, exist_ok=True)
+            make_folder(FOLDER)
             with tempfile.TemporaryFile(dir=FOLDER):
                 return cls(py_file)
         except OSError:
@@ -60,11 +61,53 @@ class _CacheImpl(caching.CompileResultCacheImpl):
     def get_filename_base(self, fullname: str, abiflags: str) -> str:
         """Return the file's name: the function's unique name, without that of its module."""
         base: str = super().get_filename_base(fullname.partition(".")[2], abiflags)
-        return base
+        return f"{base}.sha256"  # the format of the files, see cache.py
+
+
+class _CacheFile(caching.IndexDataCacheFile):
+    """Index and code of a kernel; a damaged file counts as missing."""
+
+    def _load_index(self) -> dict[Any, str]:
+        data = read_whole(Path(self._index_path))
+        version, stamp, names = (None, None, {}) if data is None else pickle.loads(data)
+        return names if (version, stamp) == (self._version, self._source_stamp) else {}
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        data = self._dump((self._version, self._source_stamp, overloads))
+        write_whole(Path(self._index_path), data)
+
+    def _load_data(self, name: str) -> Any:
+        data = read_whole(Path(self._data_path(name)))
+        return None if data is None else pickle.loads(data)
+
+    def _save_data(self, name: str, data: Any) -> None:
+        write_whole(Path(self._data_path(name)), self._dump(data))
 
 
 class _Cache(caching.Cache):
+    """Cache whose faults cost a compilation, and nothing else."""
+
     _impl_class = _CacheImpl
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file: Any = _CacheFile(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return stored code, or None where there is none that can be used."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # of whatever made the file
+            complain(FOLDER, "has files that cannot be read")
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Store code where that is possible."""
+        try:
+            super().save_overload(sig, data)
+        except OSError:
+            complain(FOLDER, "cannot be written")
 
 
 def _sizes(*given: Any) -> tuple[int, ...] | None:

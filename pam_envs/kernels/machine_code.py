@@ -21,7 +21,7 @@ from typing import Any, Protocol
 
 from pam_envs.kernels import shipped
 from pam_envs.kernels.build import INTRINSICS
-from pam_envs.kernels.cache import FOLDER, write_whole
+from pam_envs.kernels.cache import FOLDER, complain, read_whole, write_whole
 from pam_envs.kernels.notice import Notice, announce
 from pam_envs.kernels.rebind import graph_digest
 
@@ -105,12 +105,8 @@ class MachineCode:
         """Return code that was shipped with the package or cached on this machine."""
         kernel = self._source.by_address
         data = shipped.find(kernel)
-        if data is None:
-            try:
-                data = kernel.object_file().read_bytes()
-            except OSError:
-                return None
-        return load(data)
+        data = read_whole(kernel.object_file()) if data is None else data
+        return None if data is None else load(data)
 
     def _compiled(self) -> bytes:
         """Compile and wait; keep the code where that is possible."""
@@ -129,7 +125,7 @@ class MachineCode:
         try:
             write_whole(kernel.object_file(), data)
         except OSError:
-            announce(f"{FOLDER} cannot be written, so code is not kept: set PAM_ENVS_CACHE")
+            complain(FOLDER, "cannot be written")
         return data
 
     def _in_background(self) -> bool:
@@ -231,17 +227,17 @@ def intermediate_of(source: Source) -> str:
     """
     kernel = source.by_address
     deadline = time.monotonic() + STALE
-    while not kernel.ir_file.exists():
+    while (packed := read_whole(kernel.ir_file)) is None:
         code: int | None = BUSY
         if not is_busy(kernel.busy_file):
             child = start(source)
             code = None if child is None else child.wait()
             if code == 0 and kernel.ir_file.exists():
-                break
+                continue
         if code != BUSY or time.monotonic() > deadline:
             raise RuntimeError(
                 f"{kernel.name} could not be compiled in a process of its own (exit code {code}): "
                 f"its family has to be importable, and {FOLDER} writable (PAM_ENVS_CACHE)"
             )
         time.sleep(0.2)
-    return lzma.decompress(kernel.ir_file.read_bytes()).decode()
+    return lzma.decompress(packed).decode()

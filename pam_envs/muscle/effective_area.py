@@ -24,6 +24,7 @@ from pam_envs.muscle.effects import (
     MAP,
     MAP_TERMS,
     LengthCreepEffects,
+    LengthYieldEffects,
     LoadEffects,
     StaticMapEffects,
     StrandEffects,
@@ -44,6 +45,7 @@ _FIT = "least squares on positioning2021, Tables 3-5"
 class EffectiveAreaMuscle(
     StaticMapEffects,
     ViscosityEffects,
+    LengthYieldEffects,
     StrandEffects,
     LengthCreepEffects,
     LoadEffects,
@@ -61,6 +63,7 @@ class EffectiveAreaMuscle(
         ("load_stiffening_2",),
         ("load_stiffening_root",),
         ("strand_1", "strand_2", "strand_3", "strand_4", "strand_break", "strand_per_pressure"),
+        ("yield_force", "yield_per_pressure", "yield_break", "yield_ratio"),
         ("viscosity", "viscosity_speed"),
         MAP._fields,
     )

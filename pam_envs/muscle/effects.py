@@ -1,4 +1,4 @@
-"""Effects of temperature, load, viscosity, creep of the length, strands and a finer static map."""
+"""Effects of temperature, load, viscosity, creep, friction in length and a finer static map."""
 
 import math
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 from pam_envs.constants import ROOM_TEMPERATURE
 from pam_envs.kernels.arithmetic import count_on
 from pam_envs.kernels.build import LANES, kernel
+from pam_envs.kernels.yielding import deflected
 from pam_envs.parameters import assumed, declarations, effect, named_rows
 
 
@@ -131,6 +132,63 @@ def strands_on(fixed: Any, force: int) -> int:
     for i in range(STRANDS):
         on = on + count_on(fixed[force + i], 0.0)
     return on
+
+
+@dataclass(frozen=True, kw_only=True)
+class LengthYieldEffects:
+    """Friction of the length that yields smoothly: one spring in parallel with the muscle.
+
+    Its stiffness is constant and its friction grows with the effective pressure, so that it creates
+    no energy whatever length and pressure do (:mod:`pam_envs.kernels.yielding`).
+    """
+
+    yield_force: float = effect("N", 0.0, 500.0, "friction at full yield, at no pressure")
+    yield_per_pressure: float = assumed(
+        0.0, "N/Pa", -1e-3, 1e-3, "friction gained with effective pressure", neutral=0.0
+    )
+    yield_break: float = assumed(0.01, "1", 0.001, 0.3, "strain over which it yields, likewise")
+    yield_ratio: float = assumed(
+        0.5, "1", 0.0, 1.0, "0: springs back after a reversal, 1: friction of Dahl"
+    )
+
+
+@kernel
+def yield_spring(fixed: Any, j: int, first: int, drive: float) -> tuple[float, float]:
+    """Return the stiffness by strain [N], and the largest deflection at an effective pressure.
+
+    ``first`` is the first row of :class:`LengthYieldEffects`.
+    """
+    force = fixed[first][j]
+    grown = max(0.0, force + fixed[first + 1][j] * drive) / force if force > 0.0 else 0.0
+    return force / fixed[first + 2][j], grown * fixed[first + 2][j]
+
+
+@kernel
+def yield_forces(
+    rows: Any, fixed: Any, state: int, first: int, moved: Any, drive: Any, friction: Any,
+    sticking: Any,
+) -> None:  # fmt: skip
+    """Add the yielding friction [N] and its slope by strain [N] after motions of a tile.
+
+    ``state`` is the row of the deflections, ``moved`` the strains gained since.
+    """
+    deflection = rows[state]
+    for j in range(LANES):
+        stiff, limit = yield_spring(fixed, j, first, drive[j])
+        after, slope = deflected(deflection[j], moved[j], limit, fixed[first + 3][j])
+        friction[j] = friction[j] + stiff * after
+        sticking[j] = sticking[j] + stiff * slope
+
+
+@kernel
+def yield_deflections(
+    rows: Any, fixed: Any, state: int, first: int, moved: Any, drive: Any
+) -> None:
+    """Move the deflections of a tile by the strains gained."""
+    deflection = rows[state]
+    for j in range(LANES):
+        _, limit = yield_spring(fixed, j, first, drive[j])
+        deflection[j] = deflected(deflection[j], moved[j], limit, fixed[first + 3][j])[0]
 
 
 MAP_TERMS = (

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike
 
+from pam_envs import yaml_file
 from pam_envs.arrays import Array
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import entry, kernel
@@ -84,8 +84,7 @@ def activation_of(torque: ArrayLike, period: float, muscle: MuscleActivation) ->
 @functools.cache
 def calibration(activity: str, reading: Reading) -> float:
     """Return the fitted constant of a calibrated reading; raise ValueError if there is none."""
-    with open(CONSTANTS, encoding="utf-8") as file:
-        known = yaml.safe_load(file)["readings"]
+    known = yaml_file.read(CONSTANTS, "constants")["readings"]
     if reading not in known or activity not in known[reading]:
         raise ValueError(
             f"reading = {reading!r}, activity = {activity!r}; there are constants for the readings "

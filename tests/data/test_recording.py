@@ -1,6 +1,7 @@
 """Recordings, tables of readings and rig files: reading, repair and refusal."""
 
 import dataclasses
+import gzip
 import pickle
 from pathlib import Path
 
@@ -55,6 +56,19 @@ def refusal(path: Path, rig: Rig | None = None) -> str:
         load_recording(path, rig)
     assert str(path) in str(caught.value)
     return str(caught.value)
+
+
+def test_compressed_recording_equals_the_plain_one(tmp_path):
+    plain = write(tmp_path, sheet())
+    packed = tmp_path / "rig.csv.gz"
+    packed.write_bytes(gzip.compress(plain.read_bytes()))
+    one, two = load_recording(plain), load_recording(packed)
+    assert one.digest == two.digest
+    assert one.contraction.tolist() == two.contraction.tolist()
+    packed.write_bytes(packed.read_bytes()[:-200])
+    assert "is not a complete gzip file" in refusal(packed)
+    packed.write_bytes(plain.read_bytes())
+    assert "compress the CSV again" in refusal(packed)
 
 
 def test_columns_become_si_arrays(tmp_path):

@@ -12,6 +12,10 @@ SLOWEST = 0.2
 """Longest period [s] at which the motion of a muscle is still seen."""
 FASTEST = 0.01
 """Shortest period [s] that is worth replaying; faster recordings are averaged to it or above."""
+FINEST = 1e-4
+"""Shortest period [s] of a recording."""
+MOST_STEPS = 3_000_000
+"""Largest number of even steps of a recording."""
 GAP = 3.0
 """Periods without a sample that make a gap."""
 LONGEST_GAP = 600.0
@@ -58,7 +62,10 @@ def read_clock(
     if not len(inside):
         return None, ["no segment has two rows; give the samples of one experiment one label"]
     period = _period(time, inside, restart)
-    problems = _pace(period) or _paces(step, new, segment, segments, period)
+    problems = _pace(period) or _length(time, restart, period)
+    if problems:
+        return None, problems
+    problems = _paces(step, new, segment, segments, period)
     gap = np.r_[(step > GAP * period) & ~restart[1:], False]
     problems += _gaps(time, command, gap, np.r_[new, False], segment, segments, rows, period)
     return (None if problems else Clock(period, restart, gap)), problems
@@ -81,6 +88,11 @@ def _period(time: Array, inside: Array, restart: Flags) -> float:
 
 
 def _pace(period: float) -> list[str]:
+    if not period >= FINEST:
+        return [
+            f"one sample every {period:g} s is faster than {1 / FINEST:,.0f} Hz; average the "
+            "samples to 100 to 1000 Hz"
+        ]
     if period <= SLOWEST * (1.0 + 1e-6):
         return []
     sentence = (
@@ -91,6 +103,17 @@ def _pace(period: float) -> list[str]:
     if 1.0 <= period <= 200.0:
         sentence += ". Steps like these are often milliseconds: then divide time_s by 1000"
     return [sentence]
+
+
+def _length(time: Array, restart: Flags, period: float) -> list[str]:
+    starts = np.flatnonzero(restart)
+    steps = float(np.sum(time[np.r_[starts[1:] - 1, len(time) - 1]] - time[starts])) / period
+    if steps <= MOST_STEPS:
+        return []
+    return [
+        f"the rows span {steps:,.0f} periods of {period:g} s, and at most {MOST_STEPS:,} are read; "
+        "average the samples to 100 Hz, or split the recording"
+    ]
 
 
 def _paces(

@@ -2,7 +2,10 @@
 
 import csv
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+import gzip
+import itertools
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -10,10 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.arrays import Array
-from pam_envs.wording import near
+from pam_envs.wording import near, shown
 
 SHOWN = 5
 """Largest number of rows that a message names."""
+MOST_BYTES = 64_000_000
+MOST_COLUMNS = 100
+LONGEST_LABEL = 200
+"""Largest number of characters of a name or a label."""
+LARGEST = 1e20
+"""Larger numbers are none of a measurement, and overflow in sums of powers."""
 
 CONVERSIONS = {
     "s": {"ms": "divide by 1000", "us": "divide by 1e6", "min": "multiply by 60"},
@@ -106,7 +115,7 @@ class Sheet:
             found = [_number(cell or "nan") for cell in cells]
             values = np.array([np.nan if value is None else value for value in found])
             words = [i for i, value in enumerate(found) if value is None]
-        wrong = ~np.isfinite(values) & ~empty
+        wrong = ~(np.abs(values) < LARGEST) & ~empty
         wrong[words] = True
         values[wrong] = np.nan
         at = np.flatnonzero(wrong)
@@ -115,14 +124,18 @@ class Sheet:
         first = cells[at[0]]
         hint = "write decimals with a point" if "," in first else "correct the cells"
         problem = f"column {column} holds no number in {rows_text(self.rows[at])}"
-        return values, empty, [f"{problem} (the first is {first!r}); {hint}"]
+        return values, empty, [f"{problem} (the first is {shown(first)}); {hint}"]
 
 
 def read_header(path: str | Path) -> tuple[str, ...]:
     """Return the names of a file's columns; RecordingError if it cannot be read or is empty."""
     where = str(path)
     lines = _lines(Path(path), where)
-    return tuple(cell.strip() for cell in next(csv.reader(lines[:1]), []))
+    _, cells = next(_cells(lines[:1], where), (1, []))
+    header = tuple(cell.strip() for cell in cells)
+    if len(header) > MOST_COLUMNS:
+        refuse(where, f"row 1: there are {len(header)} columns; give at most {MOST_COLUMNS}")
+    return header
 
 
 def read_sheet(path: str | Path, known: Sequence[str], required: Sequence[str], what: str) -> Sheet:
@@ -138,7 +151,7 @@ def read_sheet(path: str | Path, known: Sequence[str], required: Sequence[str], 
     if len(header) == 1 and ";" in header[0]:
         refuse(where, "the cells are separated by ';'; save with ',' and with decimal points")
     problems = [
-        f"row 1: unknown column {name!r}{column_hint(name, known)}"
+        f"row 1: unknown column {shown(name)}{column_hint(name, known)}"
         for name in header
         if name not in known
     ]
@@ -151,9 +164,8 @@ def read_sheet(path: str | Path, known: Sequence[str], required: Sequence[str], 
 
 
 def _sheet(lines: list[str], header: tuple[str, ...], where: str) -> Sheet:
-    reader = csv.reader(lines)
-    next(reader)
-    filled = [(reader.line_num, cells) for cells in reader if any(c.strip() for c in cells)]
+    below = itertools.islice(_cells(lines, where), 1, None)
+    filled = [(row, cells) for row, cells in below if any(c.strip() for c in cells)]
     ragged = [(row, len(cells)) for row, cells in filled if len(cells) != len(header)]
     if ragged:
         at = rows_text(row for row, _ in ragged)
@@ -166,6 +178,16 @@ def _sheet(lines: list[str], header: tuple[str, ...], where: str) -> Sheet:
         n: [cell.strip() for cell in column] for n, column in zip(header, columns, strict=True)
     }
     return Sheet(where, cells_of, np.array(rows, dtype=np.int64))
+
+
+def _cells(lines: list[str], where: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the last line of each row, from 1, and its cells."""
+    reader = csv.reader(lines)
+    try:
+        for cells in reader:
+            yield reader.line_num, cells
+    except csv.Error as error:
+        refuse(where, f"is not CSV: {error}; look for a quote that is not closed")
 
 
 def column_hint(name: str, known: Iterable[str]) -> str:
@@ -187,16 +209,26 @@ def column_hint(name: str, known: Iterable[str]) -> str:
 
 
 def _lines(path: Path, where: str) -> list[str]:
+    """Return the lines of a CSV file, which may be compressed with gzip."""
     # utf-8-sig: spreadsheets put a byte order mark before the first column's name.
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            refuse(
+                where,
+                f"has more than {MOST_BYTES:,} bytes; average it to 100 Hz, or split it into files",
+            )
+        text = data.decode("utf-8-sig")
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        refuse(where, f"is not a complete gzip file ({error}); compress the CSV again")
     except OSError as error:
         refuse(where, f"cannot be read: {error.strerror or error}")
     except UnicodeDecodeError as error:
         refuse(where, f"is not text in UTF-8 ({error.reason}); save it as CSV in UTF-8")
-    if not lines:
+    if not text:
         refuse(where, "is empty; row 1 must name the columns")
-    return lines
+    return text.splitlines()
 
 
 def _number(cell: str) -> float | None:

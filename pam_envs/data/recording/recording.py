@@ -19,6 +19,7 @@ from pam_envs.arrays import Array, Flags, Indices
 from pam_envs.constants import BAR, MM
 from pam_envs.data.recording import clock as clocks
 from pam_envs.data.recording.columns import (
+    LONGEST_LABEL,
     RecordingError,
     Sheet,
     read_header,
@@ -70,6 +71,7 @@ FORGIVEN = ("temperature_C", "supply_pressure_bar", "force_N")
 FORGIVEN_SHARE = 0.05
 MEASURED = ("pressure", "contraction", "temperature", "supply", "force")
 LEAST_ROWS = 10
+MOST_SEGMENTS = 1000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -303,6 +305,10 @@ def _recording(
     if len(rows) < LEAST_ROWS:
         refuse(source, f"{len(rows)} rows are too few; give at least {LEAST_ROWS}")
     segments = tuple(dict.fromkeys(labels))
+    if len(segments) > MOST_SEGMENTS:
+        refuse(source, f"there are {len(segments)} segments; give at most {MOST_SEGMENTS}")
+    if any(len(label) > LONGEST_LABEL for label in segments):
+        refuse(source, f"a segment's label has more than {LONGEST_LABEL} characters; shorten it")
     index = {label: i for i, label in enumerate(segments)}
     segment = np.array([index[label] for label in labels], dtype=np.int64)
     problems = returns(segment, segments, rows)

@@ -73,7 +73,7 @@ def cross_validate(
         part = replace(blocks, held_out=out)
         again = replace(problem, train=part.train)
         for candidate, kept in zip(candidates, errors, strict=True):
-            kept[:, out] = refit(again, part, candidate, CROSS_ROUNDS).errors[:, out]
+            kept[:, out] = refit(again, part, candidate, CROSS_ROUNDS, problem).errors[:, out]
     return [replace(c, errors=e) for c, e in zip(candidates, errors, strict=True)]
 
 

@@ -32,9 +32,7 @@ SETTLING = (0.5, 2.0, 6.0)
 """Time constants [s] of the settling after a start that was not at rest."""
 MOST_STARTS = 6
 """Largest number of restarts that have their own settling."""
-ROUNDS = 10
-FAR = 8.0
-"""Cost per reading of the base from which a fit also starts at the guess of the force balance."""
+ROUNDS = 30
 CLEAR = 1.0
 """Gain of a difference from which it is needed without a further look."""
 NOISE_ONLY = 1.06
@@ -94,13 +92,13 @@ class FlexibleBase:
 
     def fitted(self, causes: Sequence[tuple[Cause, Form]]) -> Candidate:
         """Return the base extended by some causes at once, from the best of several starts."""
-        fits, plain = [], self.base.fit
-        begins = [plain.z]
-        if self.guess and plain.cost > FAR * self.problem.seen:
-            begins.append(
-                np.array([inside(f, self.guess.get(f.name, f.start)) for f in plain.frees])
-            )
-        for begin, k in product(begins, range(STARTS)):
+        plain, fits = self.base.fit, []
+        begins: list[tuple[Array, int, Mapping[str, float]]]
+        begins = [(plain.z, k, {}) for k in range(STARTS)]
+        if self.guess:
+            guessed = [f.inner(f.within(self.guess.get(f.name, f.start))) for f in plain.frees]
+            begins.append((np.array(guessed), 0, self.guess))
+        for begin, k, guess in begins:
             frees = tuple(
                 free
                 for _, form in causes
@@ -108,12 +106,12 @@ class FlexibleBase:
                     self.family,
                     form,
                     [
-                        self.guess.get(t.name, start)
+                        guess.get(t.name, start)
                         for t, start in zip(form.terms, form.start(k), strict=True)
                     ],
                 )
             )
-            z = np.concatenate([begin, [inside(f, f.start) for f in frees]])
+            z = np.concatenate([begin, [f.inner(f.within(f.start)) for f in frees]])
             fits.append(restarted(plain, frees=(*plain.frees, *frees), z=z, shared=None))
         lsq.evaluate(self.problem, fits)
         lsq.improve(self.problem, fits, 2, 1e-4, lsq.FEW_DAMPINGS)
@@ -164,9 +162,3 @@ class FlexibleBase:
         """Return whether the base leaves hardly more than noise on every channel."""
         some = self.blocks.counts.sum(axis=1) > 0
         return bool(np.all(self.blocks.means(self.base.errors)[some] < NOISE_ONLY))
-
-
-def inside(free: lsq.Free, value: float) -> float:
-    """Return the internal coordinate of a starting value, moved into the bounds."""
-    low = max(free.low, 1e-9) if free.log else free.low
-    return free.inner(float(np.clip(value, low, free.high)))

@@ -147,9 +147,9 @@ def hold_out(
     choice = replace(choice, rows=choice.rows & ~np.broadcast_to(early, choice.rows.shape))
     rows, again = choice.rows, replace(problem, train=~choice.rows)
     part = _held_blocks(problem, blocks, rows)
-    first = refit(again, blocks, plain)
-    old = _thoroughly(again, blocks, first, base) if base.causes else first
-    new = old if model is base else _thoroughly(again, blocks, old, model)
+    first = refit(again, blocks, plain, before=problem)
+    old = _thoroughly(problem, again, blocks, first, base) if base.causes else first
+    new = old if model is base else _thoroughly(problem, again, blocks, old, model)
     by_kind = choice.by == "kinds"
     found: list[Candidate | None] = [new if r is model else None for r in rivals]
     others = [
@@ -160,7 +160,7 @@ def hold_out(
     fitted = _side_by_side(again, old, [rivals[k] for k in others])
     for k, candidate in zip(others, fitted, strict=True):
         thorough = any(rivals[k] is c for c in close)
-        found[k] = _thoroughly(again, blocks, old, rivals[k]) if thorough else candidate
+        found[k] = _thoroughly(problem, again, blocks, old, rivals[k]) if thorough else candidate
     less = without_each_cause(again, blocks, first, new) if len(model.causes) > 1 else {}
 
     def scored(candidate: Candidate) -> Candidate:
@@ -197,9 +197,12 @@ def _side_by_side(
     return [replace(c, fit=fit) for c, fit in zip(candidates, fits, strict=True)]
 
 
-def _thoroughly(problem: Problem, blocks: Blocks, base: Candidate, model: Candidate) -> Candidate:
+def _thoroughly(
+    before: Problem, problem: Problem, blocks: Blocks, base: Candidate, model: Candidate
+) -> Candidate:
     """Return a candidate refitted from its previous optimum or from the base, the better one."""
-    there, here = refit(problem, blocks, model), _side_by_side(problem, base, [model])[0]
+    there = refit(problem, blocks, model, before=before)
+    here = _side_by_side(problem, base, [model])[0]
     if here.fit.cost < there.fit.cost:
         polish(problem, [here.fit])
     return min(there, here, key=lambda c: c.fit.cost)

@@ -127,12 +127,18 @@ def far(free: Free, here: float) -> float:
 
 def _shown(problem: Problem, base: Fit, columns: Sequence[Array]) -> Iterator[Shown]:
     """Yield the effect of each column relative to the base."""
-    basis, without = base_subspace(base), problem.residuals(column_of(base, base.z)[None])[0]
-    for at in range(0, len(columns), TOGETHER):
-        traces = problem.residuals(np.array(columns[at : at + TOGETHER])) - without
+    basis = base_subspace(base)
+    for traces in changes(problem, column_of(base, base.z), columns):
         for trace, left in zip(traces, projected(traces, basis), strict=True):
             raw = float(np.linalg.norm(trace)) / np.sqrt(trace.size)
             yield Shown(left, size_over_noise(left, problem), raw)
+
+
+def changes(problem: Problem, here: Array, columns: Sequence[Array]) -> Iterator[Array]:
+    """Yield the changes of the residual by parameter columns, some at a time, shape (n, m)."""
+    without = problem.residuals(here[None])[0]
+    for at in range(0, len(columns), TOGETHER):
+        yield problem.residuals(np.array(columns[at : at + TOGETHER])) - without
 
 
 def lookalikes(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:

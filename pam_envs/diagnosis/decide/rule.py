@@ -14,7 +14,7 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "3"  # part of every report
+    version: str = "4"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     trial_penalty: float = (
@@ -49,6 +49,10 @@ class Rule:
     simpler_share: float = 0.03
     folds: int = 3  # folds of the cross-validation of close rivals
     draws: int = 400  # bootstrap samples
+
+
+LITTLE = 0.3
+"""Mean square above the noise of which no share is judged."""
 
 
 @dataclass(frozen=True)
@@ -98,9 +102,13 @@ def is_accepted(level: Mapping[str, Any], required: float, rule: Rule) -> bool:
 
 
 def explained_fraction(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:
-    """Return the removed share of the mean square above the noise (infinite if there was none)."""
-    over = float(before["left"]["excess"]) - 1.0
-    return 1.0 - (float(after["left"]["excess"]) - 1.0) / over if over > 0.0 else np.inf
+    """Return the removed share of the mean square above the noise, on the channel with the most.
+
+    Infinite if there was none.
+    """
+    pairs = zip(before["left"]["by_channel"], after["left"]["by_channel"], strict=True)
+    shares = [1.0 - (now - 1.0) / (was - 1.0) for was, now in pairs if was > 1.0 + LITTLE]
+    return max(shares, default=np.inf)
 
 
 def not_excluded(rivals: Sequence[Mapping[str, Any]], rule: Rule) -> tuple[int, ...]:

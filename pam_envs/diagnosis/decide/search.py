@@ -1,18 +1,20 @@
 """Search over causes: rival extensions of one base, fitted side by side."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.decide.screen import Screen, chosen
 from pam_envs.diagnosis.fit import candidate as candidates
 from pam_envs.diagnosis.fit import least_squares as lsq
 from pam_envs.diagnosis.fit.blocks import Blocks
 
-SCHEDULE = ((2, 8, 0.4), (2, 5, 0.6), (4, 4, 0.8))
+MOST_FITS = 14  # number of starting points that are fitted
+SCHEDULE = ((2, 8, 0.4), (2, 5, 0.6), (3, 4, 0.8))
 """Rounds with the base's Jacobian held; number of fits kept then, or their least share of the best
 gain."""
-FIRST_SIGHT = 0.3  # share of a required gain that the first round of a search must reach
+FIRST_SIGHT = 0.3  # share of a required gain that the prediction of a search must reach
 POLISHED = 3  # number of the best rivals that are polished
 
 
@@ -21,27 +23,26 @@ def search(
     family: lsq.PlantFamily,
     blocks: Blocks,
     base: candidates.Candidate,
-    causes: Iterable[Cause],
+    causes: Sequence[Cause],
+    screen: Screen,
     polished: int = POLISHED,
     least: float = 0.0,
 ) -> list[candidates.Candidate]:
     """Return the base extended by each cause, best first; empty below a gain of ``least``."""
     candidates.complete_jacobian(problem, base.fit)
     shared = lsq.share(problem, base.fit)
+    rivals = [cause for cause in causes if cause.name not in base.names]
+    predicted = chosen(screen.predictions(problem, family, base.fit, shared, rivals), MOST_FITS)
+    if not predicted:
+        return []
+    if least > 0.0 and predicted[0][0] < FIRST_SIGHT * -np.expm1(-least) * base.fit.cost:
+        return []
     fits = [
         fit
-        for cause in causes
-        if cause.name not in base.names
-        for form in cause.forms
-        for fit in candidates.initial_fits(problem, family, base.fit, cause, form, shared)
+        for _, cause, form, values in predicted
+        for fit in candidates.initial_fits(problem, family, base.fit, cause, form, shared, [values])
     ]
-    if not fits:
-        return []
     lsq.evaluate(problem, fits)
-    if least > 0.0:
-        lsq.improve(problem, fits, 1, 1e-4, lsq.FEW_DAMPINGS)
-        if np.log(base.fit.cost / min(f.cost for f in fits)) < FIRST_SIGHT * least:
-            return []
     for rounds, kept, share_kept in SCHEDULE:
         lsq.improve(problem, fits, rounds, 1e-4, lsq.FEW_DAMPINGS)
         _drop(fits, base.fit.cost, kept, share_kept)

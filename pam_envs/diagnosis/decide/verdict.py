@@ -11,6 +11,7 @@ from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.decide import compare
 from pam_envs.diagnosis.decide.compare import cross_validate
 from pam_envs.diagnosis.decide.rule import Judgement, Rule, judge, required_gain
+from pam_envs.diagnosis.decide.screen import Screen
 from pam_envs.diagnosis.decide.search import search
 from pam_envs.diagnosis.decide.structure import Regressors, flexible_r2, spectral_peak
 from pam_envs.diagnosis.fit.blocks import Blocks
@@ -61,9 +62,10 @@ def remaining_structure(
         rest -= float(np.log(1.0 - min(share, 0.999)))
         peaks.append(spectral_peak(row, period, regressors.values["pressure"]))
     some = blocks.counts.sum(axis=1) > 0
-    excess = float(np.max(blocks.means(candidate.errors)[some], initial=0.0))
-    peak = max(p[1] for p in peaks)
-    return {"r2": r2, "rest": rest, "peaks": peaks, "peak": peak, "excess": excess}
+    means = blocks.means(candidate.errors)
+    by_channel = [float(v) if s else 0.0 for v, s in zip(means, some, strict=True)]
+    found = {"r2": r2, "rest": rest, "peaks": peaks, "peak": max(p[1] for p in peaks)}
+    return found | {"excess": max(by_channel), "by_channel": by_channel}
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,7 @@ class Ladder:
     causes: Sequence[Cause]
     regressors: Regressors
     rule: Rule
+    screen: Screen
     seed: int = 0
     unseen: frozenset[str] = frozenset()  # causes that may be rivals, but cannot be named
 
@@ -100,7 +103,7 @@ class Ladder:
 
     def models(self) -> list[Models]:
         """Return the best models with one cause, two, ... while a further one may be accepted."""
-        rivals = search(self.problem, self.family, self.blocks, self.base, self.causes)
+        rivals = search(self.problem, self.family, self.blocks, self.base, self.causes, self.screen)
         if not rivals:
             return []
         rivals = compare.prefer_simpler(self.blocks, self.base, rivals, self.rule)
@@ -129,12 +132,14 @@ class Ladder:
         if first_gain < self.rule.least_gain or possible < required:
             return []
         data = (self.problem, self.family, self.blocks)
-        larger = search(*data, model, self.causes, 2, self.rule.hint * required)
+        larger = search(*data, model, self.causes, self.screen, 2, self.rule.hint * required)
         if max((self.gain(c, model) for c in larger), default=0.0) < required:
             return []
         if len(found) == 1:
+            best = max(self.gain(c) for c in larger)
             for first in rivals[1 : self.rule.beam]:
-                larger += search(*data, first, self.causes, 2)[:4]
+                behind = max(0.0, best - self.gain(first))
+                larger += search(*data, first, self.causes, self.screen, 2, behind)[:4]
         larger.sort(key=lambda c: -self.gain(c))
         larger = compare.distinct(larger)
         return self.named_first(
@@ -260,6 +265,7 @@ def decide(
         [*causes, *unseen],
         regressors,
         rule,
+        Screen.make(problem, family, base.fit, [*causes, *unseen]),
         seed,
         frozenset(cause.name for cause in unseen),
     )

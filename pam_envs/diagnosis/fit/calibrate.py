@@ -5,15 +5,21 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
-from scipy.optimize import lsq_linear
 
 from pam_envs.arrays import Array
-from pam_envs.constants import GRAVITY
 from pam_envs.diagnosis.cause import Form
+from pam_envs.diagnosis.fit.balance import Balance
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base, frees_for
-from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of, evaluate, improve
+from pam_envs.diagnosis.fit.least_squares import (
+    FEW_DAMPINGS,
+    Fit,
+    Free,
+    Problem,
+    column_of,
+    evaluate,
+    improve,
+)
 from pam_envs.diagnosis.fit.single_muscle import CLOCK, LAG, ORIFICES, PILOT, MuscleFamily
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -21,10 +27,7 @@ from pam_envs.pneumatics.flow import REPLACED
 
 FAST = 0.04  # lag [s] below which the replay takes finer steps
 FINE_STEP = 0.0101
-GUESS_ROUNDS, ROUNDS = 6, 12
-FAR = 8.0  # cost per reading above which a fit may be in a local optimum
-SLOW = 0.008  # speed [m/s] below which a sample is an equilibrium of forces
-MOST = 4000  # largest number of samples
+GUESS_ROUNDS, ROUNDS = 6, 10
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,17 +53,24 @@ def calibrate(
     """Fit the base of a plant.
 
     The regulator is fitted first, to the pressure alone, in several orders; then the static map
-    and the friction by a regression of the force balance; then all parameters by simulation. If
-    that fit is far from the readings, a second one starts from the given plant, and the better
-    of the two is kept. ``measured`` (channels, T) is NaN where there is no reading, ``noise``
-    is its RMS (channels,), ``shapes`` those of :class:`Problem`; ``rates`` are the forms of a
-    limited rate that the regulator may have.
+    and the friction by a regression of the force balance; then all parameters by simulation, from
+    that guess and from the given plant. ``measured`` (channels, T) is NaN where there is no
+    reading, ``noise`` is its RMS (channels,), ``shapes`` those of :class:`Problem`; ``rates`` are
+    the forms of a limited rate that the regulator may have.
     """
     extra = np.zeros((0, 0)) if shapes is None else shapes
     longest = float(np.nanmax(measured[0], initial=0.0))
     family = dataclasses.replace(family, longest=longest)
     problem = Problem(
-        family.simulate, measured, noise, blocks.train, time, family.tie, extra, family.penalty
+        family.simulate,
+        measured,
+        noise,
+        blocks.train,
+        time,
+        family.tie,
+        extra,
+        family.violations,
+        family.checks,
     )
     column, rate = family.column, None
     found: dict[str, float] = {}
@@ -71,24 +81,24 @@ def calibrate(
         if family.plant.air == "regulator" and found[LAG] < FAST:
             family = family.finer(FINE_STEP)
         problem = dataclasses.replace(
-            problem, simulate=family.simulate, tie=family.tie, penalty=family.penalty
+            problem, simulate=family.simulate, tie=family.tie, violations=family.violations
         )
         column = column_of(fit, fit.z)
     frees = family.base()
-    tried, law = [frees], {}
+    tried: list[tuple[Free, ...]] = [frees]
+    law: dict[str, float] = {}
+    wide: dict[str, float] = {}
     plays = family.plant.hysteresis.model.kind == PlayOperator.kind
     if np.isfinite(measured[0]).any() and plays:
-        law = balance(family, measured[0], family.simulate(column[None])[1, :, 0])
+        pressure = family.simulate(column[None])[1, :, 0]
+        slow = Balance.of(family, measured[0], pressure, noise[0])
+        if slow is not None:
+            law, wide = slow.solve(), slow.flexible()
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column
-    best = fit_base(problem, blocks, plain, tried[0], ROUNDS)
-    for start in tried[1:]:
-        if best.fit.cost < FAR * problem.seen:
-            break
-        other = fit_base(problem, blocks, plain, start, ROUNDS)
-        best = min(best, other, key=lambda c: c.fit.cost)
-    return Calibration(family, problem, best, found | law, rate)
+    best = fit_base(problem, blocks, plain, tried, ROUNDS)
+    return Calibration(family, problem, best, found | law | wide, rate)
 
 
 ORDER_GAIN = 0.05
@@ -118,10 +128,7 @@ def regulator(
     limits: list[tuple[Free, ...]] = [()]
     for form in rates:
         if not flows and not any(t.name in known for t in form.terms):
-            limits += [
-                frees_for(family, form, form.start(k))
-                for k in range(max(len(t.starts) for t in form.terms))
-            ]
+            limits += [frees_for(family, form, values) for values in form.starts]
     fits = [Fit.at_start((*order, *limit), family.column) for order in orders for limit in limits]
     only = dataclasses.replace(problem, measured=alone)
     chosen = _simplest(only, blocks, fits)
@@ -151,7 +158,7 @@ def regulator(
 def _simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
     """Return the best of some fits; one with more parameters needs a gain."""
     evaluate(problem, fits)
-    improve(problem, fits, rounds, 1e-4)
+    improve(problem, fits, rounds, 1e-4, FEW_DAMPINGS)
     errors = [blocks.errors(problem.rows(fit.residual)) for fit in fits]
     chosen = 0
     for k in range(1, len(fits)):
@@ -178,65 +185,9 @@ def orifices_of(plant: SingleMuscle) -> SingleMuscle:
     return plant.replace(values).with_air("flow")
 
 
-def balance(family: MuscleFamily, contraction: Array, pressure: Array) -> dict[str, float]:
-    """Return coefficients of the static law and play weights; none with too few slow samples.
-
-    In slow motion the load equals the force law, which is linear in its coefficients for given play
-    outputs. The result only starts a fit, since its regressors contain noise. ``contraction`` (T,)
-    are readings [m], NaN where there is none, ``pressure`` (T,) is simulated [Pa].
-    """
-    plant, load, period = family.plant, family.inputs.load, family.inputs.period
-    usable = np.isfinite(contraction)
-    below = plant._absolute(np.zeros(1), load[:1])[0] if load[0] > 0 else 0.0
-    contraction = contraction + float(below)  # relative to the unloaded rest length
-    window = max(3, round(0.1 / period))
-    smooth = uniform_filter1d(np.nan_to_num(contraction), window)
-    pace = np.abs(np.gradient(smooth, period))
-    rows = np.flatnonzero(usable & (uniform_filter1d(pace, window) < SLOW))
-    if len(rows) < 200:
-        return {}
-    rows = rows[:: max(1, len(rows) // MOST)]
-    e, p = smooth[rows] / plant.muscle.rest_length, pressure[rows]
-    thresholds: tuple[float, ...] = plant.hysteresis.model.thresholds  # type: ignore[attr-defined]
-    plays = [PlayOperator((size,), (1.0,), 0.0).simulate(pressure)[0] for size in thresholds]
-    gaps = (pressure - np.reshape(plays, (len(thresholds), len(pressure))))[:, rows]
-    force = load[rows] * GRAVITY
-    bend = -np.expm1(-e / plant.muscle.braid_strain)
-    passive = [-bend, -e, -(e**2), -(e**3), -(e**4)]
-    taper = np.zeros(len(rows))
-    found: dict[str, float] = {}
-    for _ in range(3):
-        columns = np.array([p, -e * p, -(e**2) * p, *passive, *(-gaps * (1.0 - taper))]).T
-        scale = np.linalg.norm(columns, axis=0) + 1e-12
-        low = np.full(columns.shape[1], -np.inf)
-        low[[0, 3]] = 0.0
-        low[8:] = 0.0
-        solved = lsq_linear(columns / scale, force, (low, np.full(len(low), np.inf)))
-        c = solved.x / scale
-        area = max(c[0], 1e-6)
-        taper = np.clip((c[1] * e + c[2] * e**2) / area, -1.0, 0.95)
-        found = {
-            "muscle.area": area,
-            "muscle.area_taper": c[1] / area,
-            "muscle.area_curve": c[2] / area,
-            "muscle.braid_force": max(c[3], 1e-3),
-            "muscle.stiffness": c[4],
-            "muscle.softening": c[5],
-            "muscle.hardening": c[6],
-            "muscle.stiffening": c[7],
-        }
-        found |= {f"hysteresis.weight[{k}]": w / area for k, w in enumerate(c[8:])}
-    return found
-
-
 def start_at_guess(frees: tuple[Free, ...], found: dict[str, float]) -> tuple[Free, ...]:
     """Return free parameters that start at the guess, within their bounds."""
-    made = []
-    for free in frees:
-        if free.name not in found:
-            made.append(free)
-            continue
-        low = max(free.low, 1e-9) if free.log else free.low
-        start = float(np.clip(found[free.name], low, free.high))
-        made.append(dataclasses.replace(free, start=start))
-    return tuple(made)
+    return tuple(
+        dataclasses.replace(f, start=f.within(found[f.name])) if f.name in found else f
+        for f in frees
+    )

@@ -12,6 +12,7 @@ from pam_envs.diagnosis.fit import least_squares as lsq
 from pam_envs.diagnosis.fit.blocks import Blocks
 
 POLISH = 6  # largest number of rounds with the full Jacobian
+RACE = 6  # rounds after which only the best of several starts continues
 FEW_ROUNDS = 3  # rounds of a model without one of its causes
 POLISHED_ENOUGH = 1e-3  # relative decrease of the cost below which polishing ends
 
@@ -49,8 +50,7 @@ def starting_points(
         if key not in base.begins:
             base.begins[key] = [tuple(s) for s in form.search(problem, family, base, form)]
         return list(base.begins[key])
-    n = max(len(t.starts) for t in form.terms)
-    return [tuple(form.start(i)) for i in range(n)]
+    return form.starts
 
 
 def initial_fits(
@@ -60,13 +60,15 @@ def initial_fits(
     cause: Cause,
     form: Form,
     shared: lsq.Shared | None = None,
+    starts: Sequence[Sequence[float]] | None = None,
 ) -> list[lsq.Fit]:
-    """Return the fits of a form at their starting points, with the base's Jacobian."""
+    """Return the fits of a form at starting points (default: all), with the base's Jacobian."""
     names = {f.name for f in base.frees}
     if not any(t.amount and t.name not in names for t in form.terms):
         return []
     fits = []
-    for values in starting_points(problem, family, base, form):
+    points = starting_points(problem, family, base, form) if starts is None else starts
+    for values in points:
         frees = tuple(f for f in frees_for(family, form, values) if f.name not in names)
         z = np.concatenate([base.z, [f.inner(f.start) for f in frees]])
         fits.append(
@@ -76,15 +78,19 @@ def initial_fits(
 
 
 def polish(problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH) -> None:
-    """Improve fits with the Jacobian of all their parameters."""
+    """Improve fits in all their parameters, at first with the Jacobian of their base."""
     for fit in fits:
-        fit.done, fit.damping, fit.shared = False, 1.0, None
+        if fit.shared is not None and len(fit.slopes):
+            fit.slopes = np.vstack([fit.shared.slopes, fit.slopes[:, : problem.seen]])
+        elif len(fit.slopes) != len(fit.frees):
+            fit.slopes = fit.slopes[:0]
+        fit.done, fit.damping, fit.shared, fit.fresh = False, 1.0, None, False
     lsq.improve(problem, fits, rounds, POLISHED_ENOUGH)
 
 
 def complete_jacobian(problem: lsq.Problem, fit: lsq.Fit) -> None:
     """Compute the Jacobian of a fit by all its parameters, if it is missing."""
-    if fit.shared is not None or len(fit.slopes) != len(fit.frees):
+    if fit.shared is not None or not fit.fresh:
         fit.shared = None
         lsq.differentiate(problem, [fit])
 
@@ -93,22 +99,42 @@ def fit_base(
     problem: lsq.Problem,
     blocks: Blocks,
     column: Array,
-    frees: tuple[lsq.Free, ...],
+    starts: Sequence[tuple[lsq.Free, ...]],
     rounds: int = 25,
 ) -> Candidate:
-    """Fit the base parameters of a plant."""
-    fit = lsq.Fit.at_start(frees, column)
-    lsq.evaluate(problem, [fit])
+    """Fit the base parameters of a plant, from the best of several starts."""
+    fits = [lsq.Fit.at_start(frees, column) for frees in starts]
+    lsq.evaluate(problem, fits)
+    if len(fits) > 1:
+        lsq.improve(problem, fits, RACE, 1e-5)
+        rounds -= RACE
+    fit = min(fits, key=lambda f: f.cost)
     lsq.improve(problem, [fit], rounds, 1e-5)
-    lsq.differentiate(problem, [fit])
+    complete_jacobian(problem, fit)
     return Candidate((), fit, blocks.errors(problem.rows(fit.residual)))
 
 
-def refit(problem: lsq.Problem, blocks: Blocks, candidate: Candidate, rounds: int = 6) -> Candidate:
-    """Return a candidate refitted to other training samples."""
+def refit(
+    problem: lsq.Problem,
+    blocks: Blocks,
+    candidate: Candidate,
+    rounds: int = 6,
+    before: lsq.Problem | None = None,
+) -> Candidate:
+    """Return a candidate refitted to other training samples.
+
+    ``before`` is the problem of its fit, whose Jacobian is then used first.
+    """
     fit = restarted(candidate.fit, shared=None)
+    old = candidate.fit
+    if (
+        before is not None
+        and old.shared is None
+        and old.slopes.shape == (len(old.frees), len(old.residual))
+    ):
+        fit.slopes = before.carried(old.slopes, problem)
     lsq.evaluate(problem, [fit])
-    lsq.improve(problem, [fit], rounds, 1e-5)
+    lsq.improve(problem, [fit], rounds, 1e-5, renew=before is None)
     return Candidate(candidate.causes, fit, blocks.errors(problem.rows(fit.residual)))
 
 
@@ -124,7 +150,8 @@ def best_by_name(fits: Iterable[tuple[str, lsq.Fit]]) -> dict[str, lsq.Fit]:
 def restarted(fit: lsq.Fit, **changes: Any) -> lsq.Fit:
     """Return a copy of a fit in its initial state."""
     empty = np.zeros((0, 0))
-    return replace(fit, done=False, damping=1.0, begins={}, slopes=empty, **changes)
+    anew = replace(fit, done=False, damping=1.0, begins={}, slopes=empty, fresh=False)
+    return replace(anew, **changes)
 
 
 def without_each_cause(
@@ -141,6 +168,7 @@ def without_each_cause(
     loses a gain of ``clear`` after a few rounds is not polished.
     """
     fits, labels = [], []
+    complete_jacobian(problem, model.fit)
     for removed, form in model.causes:
         if removed.name in base.names or (common_only and not removed.common):
             continue
@@ -150,14 +178,12 @@ def without_each_cause(
         known = dict(zip((f.name for f in base.fit.frees), base.fit.z, strict=True))
         of_base = np.array([known.get(f.name, v) for f, v in zip(frees, z, strict=True)])
         for start in (z, of_base):
-            fits.append(restarted(model.fit, frees=frees, z=start.copy(), shared=None))
+            fit = restarted(model.fit, frees=frees, z=start.copy(), shared=None)
+            fit.slopes = model.fit.slopes[kept]
+            fits.append(fit)
             labels.append(removed.name)
     if not fits:
         return {}
-    complete_jacobian(problem, base.fit)
-    shared = lsq.share(problem, base.fit)
-    for fit in fits:
-        fit.shared = shared
     lsq.evaluate(problem, fits)
     lsq.improve(problem, fits, FEW_ROUNDS, 1e-4, lsq.FEW_DAMPINGS)
     best = best_by_name(zip(labels, fits, strict=True))

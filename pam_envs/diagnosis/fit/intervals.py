@@ -41,7 +41,7 @@ def interval_half_widths(problem: Problem, blocks: Blocks, fit: Fit) -> Array:
     """
     complete_jacobian(problem, fit)
     normal, _ = normal_equations(problem, fit)
-    n = problem.seen
+    n = problem.sampled
     of = np.tile(blocks.of, len(problem.measured))[problem.order[:n]]
     pulls = fit.slopes[:, :n] * fit.residual[:n]
     sums = np.stack([np.bincount(of, row, minlength=len(blocks.held_out)) for row in pulls])

@@ -3,22 +3,25 @@
 A *column* holds all parameters of a plant; a *free* parameter is changed by a fit. Every perturbed
 or tried parameter set is a lane of one replay. Fits that share their first free parameters (the
 base) and differ in a few more (a cause) share the base's Jacobian, computed once at the base's
-optimum: near it the steps are close to Gauss-Newton, at a tenth of the simulations.
+optimum: near it the steps are close to Gauss-Newton, at a tenth of the simulations. A fit with a
+Jacobian of its own follows it by secant updates (broyden1965) and computes it again when they no
+longer help.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
 import numpy as np
 
 from pam_envs.arrays import Array, Flags, Indices
 
-DAMPINGS = (1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
+DAMPINGS = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.3)
 """Levenberg-Marquardt dampings tried side by side, each in a lane of the replay."""
 FEW_DAMPINGS = (1e-6, 1e-3, 0.3)
 LEAST_DAMPING = 1e-9  # regularisation of the normal equations
+RENEWED = 4  # number of secant updates after which a Jacobian is computed again
 STALLED = 1e3  # factor on all dampings after a round without improvement
 REACH_LOG, REACH = 1.0, 30.0  # longest steps in internal coordinates
 SHAPE_PRIOR = 50.0
@@ -43,6 +46,11 @@ class Free:
         """Return the internal coordinate of a value."""
         return float(np.log(value)) if self.log else value / self.scale
 
+    def within(self, value: float) -> float:
+        """Return a value moved into the bounds, positive on a logarithmic scale."""
+        low = max(self.low, 1e-9) if self.log else self.low
+        return float(np.clip(value, low, self.high))
+
     def outer(self, z: Array) -> Array:
         """Return the values of internal coordinates, clipped to the bounds."""
         raw = np.exp(np.clip(z, -700, 700)) if self.log else z * self.scale
@@ -57,6 +65,38 @@ class Free:
     def step(self) -> float:
         """Step of finite differences in internal coordinates."""
         return 0.01 if self.log else 0.02
+
+
+@dataclass(frozen=True)
+class Table:
+    """Settings of several free parameters, each of shape (n,)."""
+
+    place: Indices
+    log: Flags
+    scale: Array
+    bounds: Array  # (2, n): in the parameters' own units
+    spans: Array  # (2, n): in internal coordinates
+    start: Array  # internal coordinates
+    precision: Array  # 1 / prior**2, 0 without a prior
+
+    def outer(self, z: Array) -> Array:
+        """Return the values of internal coordinates (..., n), clipped to the bounds."""
+        raw = np.where(self.log, np.exp(np.where(self.log, np.clip(z, -700, 700), 0.0)), 0.0)
+        return np.clip(np.where(self.log, raw, z * self.scale), *self.bounds)
+
+
+@lru_cache(maxsize=512)
+def table_of(frees: tuple[Free, ...]) -> Table:
+    """Return the settings of free parameters as arrays."""
+    return Table(
+        np.array([f.place for f in frees], np.int64),
+        np.array([f.log for f in frees], bool),
+        np.array([f.scale for f in frees]),
+        np.array([[f.low for f in frees], [f.high for f in frees]]),
+        np.array([f.span for f in frees]).reshape(len(frees), 2).T,
+        np.array([f.inner(f.start) for f in frees]),
+        np.array([f.prior**-2 if np.isfinite(f.prior) else 0.0 for f in frees]),
+    )
 
 
 class PlantFamily(Protocol):
@@ -90,7 +130,10 @@ class Fit:
     column: Array  # all other parameters
     cost: float = np.inf  # sum of squares of the training residuals, priors included
     residual: Array = field(default_factory=lambda: np.zeros(0))  # (m,): simulated less measured
-    slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, m): by the last k of z
+    slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, m): by the last k of z;
+    # of a fit with secant updates perhaps on training samples only
+    fresh: bool = False  # whether the slopes are differences at z, not secant updates
+    age: int = 0  # number of secant updates since
     shared: Shared | None = None  # derivatives by the coordinates before them
     damping: float = 1.0  # factor on the dampings of the next round
     done: bool = False  # whether the fit has converged or was stopped
@@ -109,14 +152,21 @@ class Fit:
 
     def values(self) -> dict[str, float]:
         """Return the fitted values by name."""
-        return {f.name: float(f.outer(z)) for f, z in zip(self.frees, self.z, strict=True)}
+        outer = self.table.outer(self.z)
+        return {f.name: float(v) for f, v in zip(self.frees, outer, strict=True)}
+
+    @property
+    def table(self) -> "Table":
+        """Settings of the free parameters as arrays."""
+        return table_of(self.frees)
 
 
 @dataclass(frozen=True)
 class Problem:
     """Data and simulation shared by fits.
 
-    The weighted residuals of all channels form one vector, the training samples first.
+    The weighted residuals of all channels form one vector, the training samples first; between
+    them and the held-out samples are the violations.
     """
 
     simulate: Callable[[Array], Array]  # from columns (n, p) to outputs (channels, T, n)
@@ -128,19 +178,25 @@ class Problem:
     # (k, T): shapes that the readings of every channel may contain beside the plant's (zero offset,
     # settling at the start); their sizes are solved for in every residual
     shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    # cost of columns (n, p) that are not physical, shape (n,)
-    penalty: Callable[[Array], Array] = lambda columns: np.zeros(len(columns))
+    # violations of what is physical by columns (n, p), over their tolerance, shape (n, k)
+    violations: Callable[[Array], Array] = lambda columns: np.zeros((len(columns), 0))
+    checks: int = 0  # their number k
 
     @cached_property
     def order(self) -> Indices:
-        """Index into the flattened (channels, T) of each entry of a residual vector."""
+        """Index into the flattened (channels, T) of each sample of a residual vector."""
         mask = np.tile(self.train, len(self.measured))
         return np.concatenate([np.flatnonzero(mask), np.flatnonzero(~mask)])
 
     @cached_property
-    def seen(self) -> int:
+    def sampled(self) -> int:
         """Number of leading entries of a residual vector that are training samples."""
         return int(self.train.sum()) * len(self.measured)
+
+    @cached_property
+    def seen(self) -> int:
+        """Number of leading entries of a residual vector that a fit sees."""
+        return self.sampled + self.checks
 
     def residuals(self, columns: Array) -> Array:
         """Return weighted residuals, shape (n, channels * T); zero for missing readings."""
@@ -158,7 +214,16 @@ class Problem:
             for k, (shapes, solver) in enumerate(self._solvers):
                 apart[:, k] -= (apart[:, k] @ solver.T) @ shapes
         flat = apart.reshape(len(columns), -1)
-        return np.take(flat, self.order, axis=1)
+        return self.vectors(flat, self.violations(columns))
+
+    def vectors(self, flat: Array, violations: Array | float = 0.0) -> Array:
+        """Return residual vectors of flattened samples (n, channels * T) and violations (n, k)."""
+        made = np.empty((len(flat), flat.shape[1] + self.checks))
+        seen, order = self.sampled, self.order
+        np.take(flat, order[:seen], axis=1, out=made[:, :seen])
+        made[:, seen : self.seen] = violations
+        np.take(flat, order[seen:], axis=1, out=made[:, self.seen :])
+        return made
 
     @cached_property
     def _solvers(self) -> list[tuple[Array, Array]]:
@@ -182,38 +247,41 @@ class Problem:
         sizes = [solver @ row for (_, solver), row in zip(self._solvers, left, strict=True)]
         return np.asarray(outputs - np.array(sizes) @ self.shapes * self.noise[:, None])
 
+    def carried(self, slopes: Array, other: "Problem") -> Array:
+        """Return slopes (k, m) in the order of the residuals of a problem with other samples."""
+        flat = np.array([self.rows(row).ravel() for row in slopes])
+        return other.vectors(flat, slopes[:, self.sampled : self.seen])
+
     def rows(self, residual: Array) -> Array:
-        """Return a residual vector as an array of shape (channels, T)."""
-        out = np.empty(residual.size)
-        out[self.order] = residual
+        """Return the samples of a residual vector as an array of shape (channels, T)."""
+        out, seen = np.empty(self.measured.size), self.sampled
+        out[self.order[:seen]] = residual[:seen]
+        out[self.order[seen:]] = residual[self.seen :]
         return out.reshape(self.measured.shape)
 
 
 def column_of(fit: Fit, z: Array) -> Array:
-    """Return the column of a fit at internal coordinates ``z``."""
-    column = fit.column.copy()
-    for free, value in zip(fit.frees, z, strict=True):
-        column[free.place] = free.outer(value)
+    """Return the columns of a fit at internal coordinates ``z`` (..., n), shape (..., p)."""
+    column = np.tile(fit.column, (*z.shape[:-1], 1)) if z.ndim > 1 else fit.column.copy()
+    column[..., fit.table.place] = fit.table.outer(z)
     return column
 
 
-def _cost(problem: Problem, fit: Fit, z: Array, residual: Array) -> float:
-    seen = residual[: problem.seen]
-    priors = sum(
-        ((v - f.inner(f.start)) / f.prior) ** 2
-        for f, v in zip(fit.frees, z, strict=True)
-        if np.isfinite(f.prior)
-    )
-    unphysical = problem.penalty(column_of(fit, z)[None])[0]
-    return float(np.einsum("i,i", seen, seen)) + float(priors) + float(unphysical)
+def _costs(problem: Problem, fit: Fit, tried: Array, residuals: Array) -> Array:
+    """Return the costs of tried coordinates (k, n) with their residuals."""
+    seen = residuals[:, : problem.seen]
+    priors = (tried - fit.table.start) ** 2 @ fit.table.precision
+    return np.asarray(np.einsum("ki,ki->k", seen, seen) + priors)
 
 
 def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:
     """Compute residual and cost of fits at their present coordinates."""
-    found = problem.residuals(np.array([column_of(f, f.z) for f in fits]))
-    for fit, residual in zip(fits, found, strict=True):
-        fit.residual = residual.copy()
-        fit.cost = _cost(problem, fit, fit.z, residual)
+    columns = np.array([column_of(f, f.z) for f in fits])
+    found = problem.residuals(columns)
+    for k, fit in enumerate(fits):
+        part = slice(k, k + 1)
+        fit.residual = found[k].copy()
+        fit.cost = float(_costs(problem, fit, fit.z[None], found[part])[0])
 
 
 def shifted(fit: Fit, k: int) -> tuple[Array, float]:
@@ -242,6 +310,7 @@ def differentiate(problem: Problem, fits: Sequence[Fit]) -> None:
             fit.slopes = np.zeros((0, len(fit.residual)))
             continue
         fit.slopes = (found[at : at + n] - fit.residual) / np.array(steps[at : at + n])[:, None]
+        fit.fresh, fit.age = True, 0
         at += n
 
 
@@ -260,19 +329,18 @@ def normal_equations(problem: Problem, fit: Fit) -> tuple[Array, Array]:
         across = np.einsum("im,jm->ij", own, fit.shared.slopes)
         normal = np.block([[fit.shared.gram, across.T], [across, normal]])
         gradient = np.concatenate([np.einsum("im,m->i", fit.shared.slopes, residual), gradient])
-    for k, (free, z) in enumerate(zip(fit.frees, fit.z, strict=True)):
-        if np.isfinite(free.prior):
-            normal[k, k] += free.prior**-2
-            gradient[k] += (z - free.inner(free.start)) / free.prior**2
+    table = fit.table
+    normal[np.diag_indices(len(fit.z))] += table.precision
+    gradient += (fit.z - table.start) * table.precision
     return normal, gradient
 
 
-def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> list[Array]:
-    """Return the coordinates reached with each damping."""
+def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> Array:
+    """Return the coordinates reached with each damping, shape (dampings, n)."""
     normal, gradient = normal_equations(problem, fit)
-    spans = np.array([f.span for f in fit.frees])
-    reach = np.array([REACH_LOG if f.log else REACH for f in fit.frees])
-    low, high = spans[:, 0] - fit.z, spans[:, 1] - fit.z
+    table = fit.table
+    reach = np.where(table.log, REACH_LOG, REACH)
+    low, high = table.spans - fit.z
     scale = np.sqrt(np.diag(normal)) + 1e-6
     scaled, slope = normal / np.outer(scale, scale), gradient / scale
     tried = []
@@ -280,7 +348,7 @@ def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> list[Array]
         step = bounded_step(scaled, slope, fit.damping * relative, low * scale, high * scale)
         step /= scale
         tried.append(fit.z + step / max(1.0, float(np.max(np.abs(step) / reach))))
-    return tried
+    return np.array(tried)
 
 
 def bounded_step(normal: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
@@ -311,26 +379,66 @@ def improve(
     rounds: int,
     tolerance: float,
     dampings: Sequence[float] = DAMPINGS,
+    renew: bool = True,
 ) -> None:
-    """Improve fits by damped Gauss-Newton steps, all fits side by side."""
+    """Improve fits by damped Gauss-Newton steps, all fits side by side.
+
+    A fit ends when a step decreases its cost by less than ``tolerance``, relative to the cost, and
+    with ``renew`` only if its Jacobian was fresh.
+    """
     for _ in range(rounds):
         active = [f for f in fits if not f.done]
         if not active:
             return
-        differentiate(problem, active)
+        differentiate(problem, [f for f in active if f.held or not len(f.slopes)])
         tried = [_steps(problem, f, dampings) for f in active]
-        found = problem.residuals(
-            np.array([column_of(f, z) for f, zs in zip(active, tried, strict=True) for z in zs])
-        )
+        columns = np.concatenate([column_of(f, z) for f, z in zip(active, tried, strict=True)])
+        found = problem.residuals(columns)
         for i, (fit, zs) in enumerate(zip(active, tried, strict=True)):
-            rows = found[i * len(zs) : (i + 1) * len(zs)]
-            costs = [_cost(problem, fit, z, r) for z, r in zip(zs, rows, strict=True)]
+            part = slice(i * len(zs), (i + 1) * len(zs))
+            costs = _costs(problem, fit, zs, found[part])
             best = int(np.argmin(costs))
-            if costs[best] < fit.cost:
-                fit.done = fit.cost - costs[best] < tolerance * fit.cost
-                fit.cost, fit.z, fit.residual = costs[best], zs[best], rows[best].copy()
-                fit.damping = 1.0
-            elif fit.damping > 1.0:
-                fit.done = True
-            else:
-                fit.damping = STALLED
+            cost = float(costs[best])
+            _step(problem, fit, zs[best], cost, found[part][best], tolerance, renew)
+
+
+def _step(
+    problem: Problem,
+    fit: Fit,
+    z: Array,
+    cost: float,
+    residual: Array,
+    tolerance: float,
+    renew: bool,
+) -> None:
+    """Take a step that decreases the cost; update the Jacobian, or ask for another one."""
+    better = cost < fit.cost
+    sufficient = fit.cost - cost >= tolerance * fit.cost
+    own, fresh = not fit.held, fit.fresh
+    if better:
+        step, change = z - fit.z, residual - fit.residual
+        fit.cost, fit.z, fit.residual, fit.fresh = cost, z, residual.copy(), False
+        if sufficient:
+            fit.damping = 1.0
+            if own:
+                _secant(problem, fit, step, change)
+                if renew and fit.age >= RENEWED:
+                    fit.slopes = fit.slopes[:0]
+            return
+    if renew and own and not fresh:
+        fit.slopes, fit.damping = fit.slopes[:0], 1.0
+    elif better or fit.damping > 1.0:
+        fit.done = True
+    else:
+        fit.damping = STALLED
+
+
+def _secant(problem: Problem, fit: Fit, step: Array, change: Array) -> None:
+    """Update a Jacobian by the change of the residual along a step."""
+    seen = fit.slopes[:, : problem.seen]
+    weights = np.einsum("im,im->i", seen, seen) * step
+    length = float(weights @ step)
+    if length > 0.0:
+        missing = change[: fit.slopes.shape[1]] - step @ fit.slopes
+        fit.slopes = fit.slopes + np.outer(weights / length, missing)
+    fit.age += 1

@@ -27,8 +27,8 @@ LEAST_LINEAR = 0.02
 LEAST_STIFFNESS, LEAST_STIFFNESS_OF, LEAST_GAIN = 1.0, 50.0, 0.1
 """Least stiffness over strain, in parts of 50 N, and least slope of the force by pressure, over the
 area: a law below them is not monotone."""
-NOT_MONOTONE, REACH = 1e4, 1.1
-"""Cost of a unit of such a violation, and the checked range over the recorded one."""
+NOT_MONOTONE, REACH = 100.0, 1.1
+"""Weight of a unit of such a violation, and the checked range over the recorded one."""
 SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.gain": {"scale": 0.01},
     "regulator.time_constant": {"log": True, "prior": 1.5},
@@ -59,6 +59,8 @@ ORIFICES = {
     "regulator.source_pressure": 8e5,
 }
 """Parameters of a regulator with flow through its orifices, with their starting values."""
+SOURCE, LEAST_SOURCE = "regulator.source_pressure", 1.001
+"""Pressure of the supply, and the least one over the largest setpoint."""
 LAG = "regulator.time_constant"
 PILOT = {"regulator.pilot_lag": 0.02, "regulator.pilot_damping": 1.0}
 """Starting values of the pilot stage of a regulator of second order."""
@@ -142,14 +144,18 @@ class MuscleFamily:
         weights *= np.minimum(1.0, (1.0 - LEAST_LINEAR) / np.maximum(total, 1e-12))[:, None]
         columns[:, R.LINEAR] = 1.0 - weights.sum(axis=1)
 
-    def penalty(self, columns: Array) -> Array:
-        """Return the cost of static laws that are not monotone, shape (n,).
+    @property
+    def checks(self) -> int:
+        """Number of checks of the static law."""
+        return 2 * self._grid[0].size * self._grid[1].size if self.longest > 0.0 else 0
+
+    def violations(self, columns: Array) -> Array:
+        """Return by how much static laws fail to be monotone, shape (n, checks).
 
         The force has to fall with contraction and rise with pressure, over the recorded range.
         """
-        cost = np.zeros(len(columns))
         if self.longest <= 0.0:
-            return cost
+            return np.zeros((len(columns), 0))
         w, e = (v[None] for v in np.meshgrid(*self._grid, indexing="ij"))
 
         def value(name: str) -> Array:
@@ -169,8 +175,8 @@ class MuscleFamily:
         gain = gain + np.tensordot(sizes, gains, 1)
         lacks = np.maximum(0.0, LEAST_STIFFNESS - stiff / LEAST_STIFFNESS_OF)
         flat = np.maximum(0.0, LEAST_GAIN - gain / area)
-        cost = (lacks**2 + flat**2).sum(axis=(1, 2))
-        return np.asarray(NOT_MONOTONE * cost, np.float64)
+        apart = [NOT_MONOTONE * v.reshape(len(columns), -1) for v in (lacks, flat)]
+        return np.concatenate(apart, axis=1)
 
     @cached_property
     def _grid(self) -> tuple[Array, Array]:
@@ -209,6 +215,8 @@ class MuscleFamily:
         d, value = declared(self.plant, name), self.plant.value(name)
         made = dict(low=d.low, high=d.high, start=value)
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
+        if name == SOURCE:  # a muscle is filled from above its largest setpoint
+            made["low"] = max(d.low, LEAST_SOURCE * self.plant.regulator.max_pressure)
         return Free(name, R.place(name), **{**made, **SETTINGS.get(name, {}), **changes})
 
     def base(self) -> tuple[Free, ...]:
@@ -243,7 +251,7 @@ class MuscleFamily:
         raise unstable
 
 
-FINER = (6, 8, 12, 20, 40)
+FINER = (6, 8, 12, 20, 40, 70, 120)
 """Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
 
 

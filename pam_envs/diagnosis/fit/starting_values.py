@@ -5,6 +5,7 @@ that opens, a guide that breaks away) starts at the best points of a grid.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -69,22 +70,38 @@ def ramps(output: int) -> Callable[..., Starts]:
     return starts
 
 
-def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:
-    """Return a search for the ``best`` points of a grid of the terms [SI], in one replay."""
+@dataclass(frozen=True)
+class Grid:
+    """Search for the ``best`` points of a grid of the terms [SI], in one replay."""
 
-    def starts(problem: Problem, family: PlantFamily, base: Fit, form: Any) -> Starts:
-        points = list(product(*values))
+    values: tuple[Sequence[float], ...]
+    best: int = 3
+
+    @property
+    def points(self) -> list[tuple[float, ...]]:
+        """All points of the grid."""
+        return list(product(*self.values))
+
+    @property
+    def trials(self) -> int:
+        """Number of points."""
+        return int(np.prod([len(v) for v in self.values]))
+
+    def __call__(self, problem: Problem, family: PlantFamily, base: Fit, form: Any) -> Starts:
+        """Return the best points, best first."""
+        points = self.points
         places = [family.free(t.name, log=False).place for t in form.terms]
         columns = np.tile(column_of(base, base.z), (len(points), 1))
-        for column, point in zip(columns, points, strict=True):
-            column[places] = point
+        columns[:, places] = points
         found = problem.residuals(columns)[:, : problem.seen]
         slopes = base.slopes[:, : problem.seen]
         normal = np.einsum("im,jm->ij", slopes, slopes)
         pulls = np.einsum("im,nm->in", slopes, found)
         taken = np.einsum("in,in->n", pulls, np.linalg.pinv(normal, rcond=1e-9) @ pulls)
         left = np.einsum("nm,nm->n", found, found) - taken
-        return [points[k] for k in np.argsort(left, kind="stable")[:best]]
+        return [points[k] for k in np.argsort(left, kind="stable")[: self.best]]
 
-    starts.trials = int(np.prod([len(v) for v in values]))  # type: ignore[attr-defined]
-    return starts
+
+def grid(*values: Sequence[float], best: int = 3) -> Grid:
+    """Return the search of a grid given by the values of each term."""
+    return Grid(values, best)

@@ -7,12 +7,13 @@ replaced atomically.
 
 import json
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from pam_envs.files import write_text
 
 SCHEMA = 1  # version of the layout of ``report.json``
 DIGITS = 6  # significant digits of a number in ``report.json``
@@ -71,19 +72,6 @@ def report_json(report: Mapping[str, Any]) -> str:
     return dumps(plain({"schema": SCHEMA, **report})) + "\n"
 
 
-def write_file(path: Path, text: str) -> None:
-    """Write a text file atomically."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with open(temporary, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 def write(diagnosis: Any, folder: Path) -> None:
     """Write a diagnosis into a folder, which is created if it is missing.
 
@@ -107,8 +95,8 @@ def write(diagnosis: Any, folder: Path) -> None:
     if diagnosis.plant is not None:
         diagnosis.plant.to_yaml(folder / "plant.yaml")
     if html is not None:
-        write_file(folder / "report.html", html)
-    write_file(folder / "report.json", text)
+        write_text(folder / "report.html", html)
+    write_text(folder / "report.json", text)
     if missing is not None:
         raise ImportError(
             f"report.json is in {folder}; the page report.html needs matplotlib, which is not "

@@ -44,7 +44,7 @@ def causes(study: Any) -> list[Json]:
     for cause, form in model.causes:
         trace = traces[cause.name]
         flat = np.where(np.isfinite(problem.measured), trace, 0.0) / problem.noise[:, None]
-        left = projected(flat.ravel()[problem.order][None], basis)[0]
+        left = projected(problem.vectors(flat.reshape(1, -1)), basis)[0]
         made.append(
             {
                 "name": cause.name,

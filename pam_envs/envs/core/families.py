@@ -49,6 +49,9 @@ class Kernels:
     config: Any = NONE
     choices: Any = NONE
     """Index of each of the family's own numbers and whole numbers in the configuration."""
+    indices: Mapping[int, int] = field(default_factory=dict)
+    """Rows of the state that hold an index, with the place of its number of values in ``choices``.
+    """
     apply: Kernel = do_nothing
     """Applies actions and disturbances at the start of a control period."""
     advance: Kernel = advance_plant

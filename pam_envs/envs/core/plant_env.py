@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from pam_envs.envs.core.info import Info
 from pam_envs.envs.core.setup import (
     BEGIN,
+    MOST_STEPS,
+    NUMBER_KINDS,
     STEP,
     Configured,
     Setup,
@@ -17,10 +19,12 @@ from pam_envs.envs.core.setup import (
     check_state,
     fresh_seed,
     saved,
+    saved_part,
     space_of,
 )
 from pam_envs.kernels.build import COMPILED, address_book
 from pam_envs.kernels.random import seed_words
+from pam_envs.wording import shown
 
 INTERPRETED_CALLS = 50
 """Steps in plain Python before an environment asks for machine code, and asks again."""
@@ -54,6 +58,7 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._run: Any = None
         self._all: Any = None
         self._action_cells: Any = None
+        self._outputs: tuple[Any, ...] = ()
         self._warming = INTERPRETED_CALLS if COMPILED else 0
         self._use(setup.kernels.interpreted, compiled=False)
 
@@ -63,18 +68,22 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Plain Python is ready at once; machine code takes time to load or to compile.
         """
         setup = self.setup
-        arrays = [
-            *(setup.state(1, 1) if self._run is None else map(np.array, self._all)),
-            *setup.shared,
+        outputs = (
             np.zeros((1, len(setup.action_signals))),
             np.zeros((2, 1, len(setup.signals)), np.float32),
             np.zeros((2, len(setup.info_keys) + 1, 1)),
             np.zeros((2, 1), np.int8),
-        ]
+        )
+        own = [*setup.state(1, 1), *outputs]
+        if self._run is not None:
+            past = zip((*self._all, *self._outputs), own, strict=True)
+            own = [np.array(old, new.dtype) for old, new in past]
+        arrays = [*own[:4], *setup.shared, *own[4:]]
         held = arrays if compiled else [a.tolist() for a in arrays]
         self._all = tuple(held[:4])
         self._counts = self._all[2][0]
-        *_, self._actions, self._observations, self._infos, self._flags = held
+        self._outputs = tuple(held[-4:])
+        self._actions, self._observations, self._infos, self._flags = self._outputs
         self._run, self._compiled = function, compiled
         self._arguments: tuple[Any, ...] = (*held, 1)
         if compiled:
@@ -117,7 +126,8 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises
         ------
         ValueError
-            If the action is not finite or has the wrong shape; nothing has changed then.
+            If the action is anything but a finite, unmasked array or list of booleans, integers or
+            floats of the shape of ``action_space``; nothing has changed then.
         """
         if self._steps < 0:
             raise gym.error.ResetNeeded("call reset() before step()")
@@ -144,14 +154,15 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             if not self._warming:
                 self._change()
         cells, i = self._action_cells, 0
-        try:
-            for value in action.tolist():
-                if not isfinite(value):
-                    raise TypeError
-                cells[i] = value
-                i += 1
-        except (AttributeError, TypeError, IndexError):
-            i = -1
+        if type(action) is np.ndarray and action.dtype.kind in NUMBER_KINDS:
+            try:
+                for value in action.tolist():
+                    if not isfinite(value):
+                        raise TypeError
+                    cells[i] = value
+                    i += 1
+            except (TypeError, IndexError):
+                i = -1
         if i != self._n_actions:
             for i, value in enumerate(self._numbers(action, (self._n_actions,), "action").tolist()):
                 cells[i] = value
@@ -216,13 +227,16 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         ValueError
             If the state is of another kind of environment; nothing has changed then.
         """
-        parts = check_state(state, self.setup.state(1, 1))
+        steps = int(saved_part(state, "steps", (), "i"))
+        digits = saved_part(state, "seed", (np.size(state.get("seed", ())),), "u")
         try:
-            steps = int(state["steps"])
-            seed = int(np.asarray(state["seed"], np.uint8).tobytes().decode())
-            infos = np.asarray(state["infos"], np.float64).reshape(np.shape(self._infos))
-        except (KeyError, ValueError, TypeError) as error:
-            raise ValueError(f"the state was not made by get_state: {error!r}") from error
+            seed = int(digits.tobytes().decode())
+        except ValueError as error:
+            raise ValueError(f"the state was not made by get_state: {shown(error)}") from error
+        if not -1 <= steps <= MOST_STEPS or seed < (-1 if steps < 0 else 0):
+            raise ValueError(f"the state has steps = {steps} and seed = {shown(seed)}; no run has")
+        parts = check_state(state, self.setup, 1, 1, steps >= 0)
+        infos = saved_part(state, "infos", np.shape(self._infos), "f")
         for to, part in zip(self._all, parts, strict=True):
             for i, value in enumerate(part[0].tolist()):
                 to[0][i][0] = value[0]

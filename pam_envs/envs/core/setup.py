@@ -11,14 +11,21 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.step import CHOICE, EPISODE, N_SEED
+from pam_envs.envs.core.step import CHOICE, EPISODE, MEMBER, N_SEED
+from pam_envs.envs.core.step import STEP as STEP_ROW
+from pam_envs.hysteresis.protocol import operator_of
 from pam_envs.kernels.build import COMPILED, LANES
 from pam_envs.parameters import Signal, Signals
+from pam_envs.wording import shown
 
 Part = tuple[str, str, float, float]
 """Name, unit and range of a signal."""
 STEP, STEP_AND_RESTART, BEGIN = 0, 1, 2
 """Modes of the kernels: step; step and reset ended episodes; reset flagged ones."""
+WORD, MOST_STEPS = 2**32 - 1, 2**31 - 1
+"""Largest key word, and largest number of an episode or a control period in a saved state."""
+FIRST_STACK = MEMBER + 1
+"""First integer row of the hysteresis operators."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,29 @@ class Setup:
         """Integer rows of the two key words and of the episode number."""
         last = self.kernels.n_counts
         return last - N_SEED, last - N_SEED + 1, EPISODE
+
+    def count_limits(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the smallest and the largest value of each integer row, shape (n, 1) each."""
+        operator = operator_of(self.plant.hysteresis.operator)
+        least = np.zeros((self.kernels.n_counts, 1), np.int64)
+        most = np.full_like(least, WORD)  # key words
+        most[[EPISODE, STEP_ROW], 0] = MOST_STEPS
+        most[MEMBER] = self.shared[-1][CHOICE.members] - 1
+        stacks = slice(FIRST_STACK, -N_SEED)
+        least[stacks] = 1 if operator.largest_count > 1 else 0
+        most[stacks] = operator.largest_count
+        return least, most
+
+    def parameter_limits(self, members: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the range of each parameter of the members of tiles of lanes, (tiles, lanes)."""
+        settings, choices = self.shared[2:]
+        first = settings[choices[CHOICE.at_members] :, : self.kernels.parameters]
+        low = np.moveaxis(first[members if self.drawn else members[:1]], -1, 1)
+        high = low.copy()
+        for row, least, most in settings[choices[CHOICE.at_spread] :][: choices[CHOICE.spread], :3]:
+            slack = 1e-12 * (most - least)  # a drawn number is rounded
+            low[:, int(row)], high[:, int(row)] = least - slack, most + slack
+        return low, high
 
     def state(self, tiles: int, lanes: int) -> tuple[NDArray[Any], ...]:
         """Return zeroed state, parameters, integers and previews for tiles of ``lanes`` lanes."""
@@ -229,29 +259,59 @@ def saved(parts: tuple[Any, ...]) -> dict[str, NDArray[Any]]:
     }
 
 
-def check_state(state: Any, like: tuple[NDArray[Any], ...]) -> list[NDArray[Any]]:
-    """Return the parts of a saved state as new arrays, checked."""
-    parts = []
-    for name, zeros in zip(STATE_KEYS, like, strict=True):
-        if name not in state:
-            raise ValueError(f"the state has no {name!r}: it was not made by get_state")
-        shape = np.shape(state[name])
-        if shape != zeros.shape:
-            raise ValueError(
-                f"the state's {name!r} has shape {shape}, this environment {zeros.shape}: it was "
-                "taken with other arguments"
-            )
-        try:
-            part = np.array(state[name], zeros.dtype)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise ValueError(f"the state's {name!r} are not numbers: {error}") from error
-        wrong = part < 0 if name == "counts" else ~np.isfinite(part)
-        if wrong.any():
-            raise ValueError(
-                f"the state's {name!r} hold {part[wrong][0]}, which get_state never returns"
-            )
+def check_state(
+    state: Any, setup: Setup, tiles: int, lanes: int, started: bool
+) -> list[NDArray[Any]]:
+    """Return the parts of a saved state of tiles of lanes as new arrays, checked.
+
+    Every integer, and every index in the rows of floats, is bounded on both sides. ``started`` is
+    False before the first reset, when all integers are 0.
+    """
+    parts: list[NDArray[Any]] = []
+    least, most = setup.count_limits() if started else (0, 0)
+    for name, zeros in zip(STATE_KEYS, setup.state(tiles, lanes), strict=True):
+        part = np.array(saved_part(state, name, zeros.shape, "iu" if name == "counts" else "iuf"))
+        part = part.astype(zeros.dtype)
+        if name == "counts":
+            check_limits(name, part, least, most)
+        if name == "rows":
+            for row, number in setup.kernels.indices.items():
+                check_limits(f"{name}[:, {row}]", part[:, row], 0, setup.shared[-1][number] - 1)
         parts.append(part)
+    if started:
+        low, high = setup.parameter_limits(parts[2][:, MEMBER])
+        check_limits("fixed", parts[1], low, high)
     return parts
+
+
+def saved_part(state: Any, name: str, shape: tuple[int, ...], kinds: str) -> NDArray[Any]:
+    """Return one array of a saved state, finite, of a shape and of one of the kinds of types."""
+    if not isinstance(state, Mapping) or name not in state:
+        raise ValueError(f"the state has no {name!r}: it was not made by get_state")
+    try:
+        part = np.asarray(state[name])
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"the state's {name!r} are not numbers: {error}") from error
+    if part.dtype.kind not in kinds:
+        raise ValueError(
+            f"the state's {name!r} are of type {part.dtype}: it was not made by get_state"
+        )
+    if part.shape != shape:
+        raise ValueError(
+            f"the state's {name!r} has shape {part.shape}, this environment {shape}: it was "
+            "taken with other arguments"
+        )
+    check_limits(name, part, -np.inf, np.inf)
+    return part
+
+
+def check_limits(name: str, part: NDArray[Any], least: Any, most: Any) -> None:
+    """Raise ValueError if a part of a saved state has values that are not finite or in a range."""
+    wrong = ~(np.isfinite(part) & (part >= least) & (part <= most))
+    if wrong.any():
+        raise ValueError(
+            f"the state's {name!r} hold {part[wrong][0]}, which get_state never returns"
+        )
 
 
 def space_of(signals: Signals) -> gym.spaces.Box[np.float32]:
@@ -309,14 +369,17 @@ class Configured:
         return setup
 
     def _numbers(self, given: Any, shape: tuple[int, ...], word: str) -> NDArray[np.float64]:
-        """Return actions as an array, or raise an error that names the fault."""
+        """Return actions as an array, or raise an error that names the fault.
+
+        Accepted are finite arrays and lists (or tuples) of booleans, integers and floats; masked
+        arrays, text, dates, objects and whatever else converts to an array are refused.
+        """
         try:
-            if np.iscomplexobj(given):
-                raise TypeError("complex numbers")
+            _refuse_others(given, len(shape))
             made = np.asarray(given, np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
+        except Exception as error:  # of any class: an object runs code of its own
             raise ValueError(
-                f"{word} {str(given)[:60]!r}: not an array of shape {shape}: {error}"
+                f"{word} {shown(given)}: not an array or list of numbers of shape {shape}: {error}"
             ) from error
         if made.shape != shape:
             raise ValueError(
@@ -332,3 +395,21 @@ class Configured:
                 f"give a finite number between {low:g} and {high:g}"
             )
         return made
+
+
+NUMBER_KINDS = "biuf"
+"""Kinds of NumPy types that actions may have: booleans, integers, unsigned ones and floats."""
+
+
+def _refuse_others(given: Any, depth: int) -> None:
+    """Raise TypeError unless ``given`` is an array of numbers, or at most ``depth`` lists deep."""
+    if isinstance(given, (np.ndarray, np.generic)):
+        if isinstance(given, np.ma.MaskedArray) or given.dtype.kind not in NUMBER_KINDS:
+            raise TypeError(f"{type(given).__name__} of type {given.dtype}")
+    elif isinstance(given, (list, tuple)):
+        if depth == 0:
+            raise TypeError("too many lists in lists")
+        for value in given:
+            _refuse_others(value, depth - 1)
+    elif not isinstance(given, (bool, int, float)):
+        raise TypeError(f"{type(given).__name__}; convert it with numpy.asarray")

@@ -1,5 +1,6 @@
 """The batch of environments: the same step over rows, in tiles of lanes and over cores."""
 
+import os
 from typing import Any
 
 import gymnasium as gym
@@ -15,12 +16,14 @@ from pam_envs.envs.core.setup import (
     Configured,
     Setup,
     check_choice,
+    check_limits,
     check_seed,
     check_state,
     check_whole,
     for_kernels,
     fresh_seed,
     saved,
+    saved_part,
     space_of,
     tiles_for,
 )
@@ -30,6 +33,8 @@ from pam_envs.kernels.random import seed_words
 PARALLEL_FROM = 4096
 """Rows from which on a batch is spread over the cores."""
 MODES = tuple(mode.value for mode in AutoresetMode)
+_THREADS_OF: list[int] = []
+"""Process whose threads run parallel kernels; they do not exist in its forks."""
 
 
 class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
@@ -92,6 +97,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         self._shared = tuple(for_kernels(a) for a in setup.shared)
         self._keys = len(setup.info_keys)
         spread_out = COMPILED and threads != 1 and num_envs >= PARALLEL_FROM
+        self._parallel = spread_out
         self._kernel = setup.kernels.parallel if spread_out else setup.kernels.batch
 
     def reset(
@@ -146,6 +152,10 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
 
     def _call(self, actions: NDArray[Any], outputs: tuple[NDArray[Any], ...], mode: int) -> None:
         if COMPILED:
+            if self._parallel:
+                _THREADS_OF[:] = _THREADS_OF or [os.getpid()]
+                if [os.getpid()] != _THREADS_OF:  # a fork: the same results on one core
+                    self._kernel, self._parallel = self.setup.kernels.batch, False
             self._kernel(*self._all, *self._shared, actions, *outputs, self.num_envs, mode)
             return
         views = [a.tolist() for a in outputs]
@@ -186,7 +196,8 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         Raises
         ------
         ValueError
-            If an action is not finite or the shape is wrong; nothing has changed then.
+            If the actions are anything but a finite, unmasked array or list of booleans, integers
+            or floats of the shape of ``action_space``; nothing has changed then.
         """
         if not self._seeded:
             raise gym.error.ResetNeeded("call reset() before step()")
@@ -290,13 +301,12 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         ValueError
             If the state is of another kind of batch; nothing has changed then.
         """
-        parts = check_state(state, self.setup.state(tiles_for(self.num_envs), LANES))
-        try:
-            last = np.array(state["last"], np.float32).reshape(self._last_observation.shape)
-            seeded = bool(state["seeded"])
-            ended = np.array(state["ended"], np.bool_).reshape(self._ended.shape)
-        except (KeyError, ValueError, TypeError) as error:
-            raise ValueError(f"the state was not made by get_state: {error!r}") from error
+        seeded = bool(saved_part(state, "seeded", (), "b"))
+        parts = check_state(state, self.setup, tiles_for(self.num_envs), LANES, seeded)
+        last = saved_part(state, "last", self._last_observation.shape, "f").astype(np.float32)
+        ended = saved_part(state, "ended", self._ended.shape, "b")
+        restarts_later = seeded and self.autoreset_mode != AutoresetMode.SAME_STEP
+        check_limits("ended", ended, 0, int(restarts_later))
         self._all = tuple(map(for_kernels, parts))
-        self._last_observation, self._seeded, self._ended = last, seeded, ended
+        self._last_observation, self._seeded, self._ended = last, seeded, ended.copy()
         self._renderers = []

@@ -65,7 +65,7 @@ LEAST_RANGES, ROUND = (30.0, 15.0), 5.0
 """Smallest ranges of torque [N m] and stiffness [N m/rad], and the step of rounding."""
 MARGIN = math.radians(5.0)
 """Smallest distance [rad] of intended motions from the ends of the range."""
-RANDOMISATION = Randomization(
+RANDOMIZATION = Randomization(
     R.NAMES,
     (
         *("regulator.max_pressure", "valve.frequency", "pulley.radius", "pulley.lowest"),
@@ -278,7 +278,7 @@ def make_setup(
         made,
         partial(kernels_for, made.hysteresis.kind, made.valves),
         given,
-        RANDOMISATION,
+        RANDOMIZATION,
         observation=observation,
         references=references,
         action=actions,

@@ -55,7 +55,7 @@ MOST_PAYLOAD = 2.0
 """Largest payload [kg]."""
 USUAL_SHARE = 2.0 / 3.0
 """Share of the joint's limit that references and random starts reach."""
-RANDOMISATION = Randomization(
+RANDOMIZATION = Randomization(
     R.NAMES,
     ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
     "{'regulator.time_constant': (0.03, 0.06)}",
@@ -162,7 +162,7 @@ def make_setup(
         made,
         partial(L.kernels_for, made.hysteresis.kind, made.dynamics),
         given,
-        RANDOMISATION,
+        RANDOMIZATION,
         observation=observation,
         references=[("reference", "rad", *ANGLES)],
         action=actions,

@@ -49,7 +49,7 @@ REFERENCE_RANGES = {
 """Ranges of references, by mounting: those of yeh2010, within reach of 4.5 bar."""
 PAPER_PRESSURE = 0.69e5
 """Pressure [Pa], reached by inflation, at which the tension is 55 N as in yeh2010."""
-RANDOMISATION = Randomization(
+RANDOMIZATION = Randomization(
     R.NAMES,
     ("regulator.max_pressure", "lever.arm", "lever.fittings", "fixture.length"),
     "{'lever.stiffness': (25, 35)}",
@@ -106,7 +106,7 @@ def make_setup(
         made,
         partial(L.kernels_for, made.hysteresis.kind, made.mounting, made.dynamics),
         given,
-        RANDOMISATION,
+        RANDOMIZATION,
         observation=[
             ("tension", "N", *RANGES[L.TENSION]),
             ("stiffness", "N/m", *RANGES[L.STIFFNESS]),

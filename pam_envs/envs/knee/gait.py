@@ -59,7 +59,7 @@ STARTS = ("random", "heel_contact")
 ASSISTANCE = {"signed": -1e9, "clipped": 0.0}
 """Lowest desired assistance [N m]."""
 TENSIONS, ANGLES, TORQUES = (0.0, 600.0), (1.0, 3.2), (-60.0, 60.0)
-RANDOMISATION = Randomization(
+RANDOMIZATION = Randomization(
     R.NAMES,
     (
         *("regulator.max_pressure", "lever.arm", "lever.fittings", "lever.mount_angle"),
@@ -181,7 +181,7 @@ def make_setup(
         made,
         partial(kernels_for, made.hysteresis.kind, made.dynamics),
         given,
-        RANDOMISATION,
+        RANDOMIZATION,
         observation=[
             ("tension", "N", *TENSIONS),
             ("angle", "rad", *ANGLES),

@@ -61,7 +61,7 @@ RATES = (-6.0, 6.0)
 """Range [rad/s] of their rates."""
 MOST_PAYLOAD = 0.1
 """Largest payload [kg]. The largest one on some paths is less, which is checked."""
-RANDOMISATION = Randomization(
+RANDOMIZATION = Randomization(
     R.NAMES,
     ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
     "{'regulator.time_constant': (0.03, 0.06)}",
@@ -190,7 +190,7 @@ def make_setup(
         made,
         partial(kernels_for, made.hysteresis.kind, made.stages),
         given,
-        RANDOMISATION,
+        RANDOMIZATION,
         observation=_observation(made, action),
         references=references,
         action=_actions(made, action),

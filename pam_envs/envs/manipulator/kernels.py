@@ -240,6 +240,7 @@ def kernels_for(kind: str, stages: int, extended: bool = False) -> Kernels:
         channels=L.N_POSE + stages,
         config=L.CONFIG,
         choices=L.CHOICE,
+        indices={L.PATH: L.CHOICE.paths},
         apply=apply_chain,
         advance=advance_chain,
         reference=path_at,

@@ -43,7 +43,7 @@ LOADS = (0.0, 2.55, 4.55)
 REFERENCE_RANGE = (0.001, 0.013)
 """Range of references [m]: within reach at every measured load."""
 HIGHEST_LOAD = 5.0
-RANDOMISATION = Randomization(
+RANDOMIZATION = Randomization(
     R.NAMES,
     ("mass.load", "regulator.max_pressure", "muscle.diameter", "muscle.braid_angle"),
     "{'mass.damping': (100, 500)}",
@@ -93,7 +93,7 @@ def make_setup(
         made,
         partial(kernels_for, made.hysteresis.kind),
         given,
-        RANDOMISATION,
+        RANDOMIZATION,
         observation=[
             ("contraction", *position),
             ("pressure", *pressure),

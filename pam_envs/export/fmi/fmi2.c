@@ -27,6 +27,8 @@ static status said(instance *i, const char *problem) {
     return ERROR;
 }
 
+#include "instance.h"
+
 EXPORT const char *fmi2GetTypesPlatform(void) {
     return "default";
 }
@@ -44,16 +46,12 @@ EXPORT status fmi2SetDebugLogging(instance *i, int on, size_t n, const char *con
 EXPORT instance *fmi2Instantiate(
     const char *name, int kind, const char *token, const char *resources,
     const callbacks *functions, int visible, int logging) {
-    instance *i;
+    instance *i = kind == 1 ? instantiated(token) : 0;
     (void)name, (void)resources, (void)visible;
-    if (kind != 1 || !token || strcmp(token, TOKEN) != 0)
-        return 0;
-    i = malloc(sizeof *i);
-    if (!i)
-        return 0;
-    i->functions = functions;
-    i->logging = logging;
-    restart(&i->state);
+    if (i) {
+        i->functions = functions;
+        i->logging = logging;
+    }
     return i;
 }
 
@@ -70,104 +68,83 @@ EXPORT status fmi2SetupExperiment(
 }
 
 EXPORT status fmi2EnterInitializationMode(instance *i) {
-    (void)i;
-    return OK;
+    return accepted(i);
 }
 
 EXPORT status fmi2ExitInitializationMode(instance *i) {
-    begin(&i->state);
-    i->state.running = true;
-    return OK;
+    return finish_initialisation(i);
 }
 
 EXPORT status fmi2Terminate(instance *i) {
-    (void)i;
-    return OK;
+    return accepted(i);
 }
 
 EXPORT status fmi2Reset(instance *i) {
-    restart(&i->state);
-    return OK;
+    return start_again(i);
 }
 
 EXPORT status fmi2GetReal(instance *i, const reference at[], size_t n, double values[]) {
-    for (size_t k = 0; k < n; k++)
-        if (!get_real(&i->state, at[k], values + k))
-            return said(i, "there is no Real with this value reference");
-    return OK;
+    return get_reals(i, at, n, values);
 }
 
 EXPORT status fmi2SetReal(instance *i, const reference at[], size_t n, const double values[]) {
-    for (size_t k = 0; k < n; k++)
-        if (said(i, set_real(&i->state, at[k], values[k])) != OK)
-            return ERROR;
-    return OK;
+    return set_reals(i, at, n, values);
 }
 
 EXPORT status fmi2GetBoolean(instance *i, const reference at[], size_t n, int values[]) {
-    double value;
+    bool flag;
     for (size_t k = 0; k < n; k++) {
-        if (!get_real(&i->state, at[k], &value))
-            return said(i, "there is no Boolean with this value reference");
-        values[k] = value != 0.0;
+        if (get_flag(i, at[k], &flag) != OK)
+            return ERROR;
+        values[k] = flag;
     }
     return OK;
 }
 
 EXPORT status fmi2GetInteger(instance *i, const reference at[], size_t n, int values[]) {
+    int64_t value;
     for (size_t k = 0; k < n; k++) {
-        if (at[k] != SEED)
-            return said(i, "there is no Integer with this value reference");
-        values[k] = (int)i->state.seed;
+        if (get_whole(i, at[k], &value) != OK)
+            return ERROR;
+        values[k] = (int)value;
     }
     return OK;
 }
 
 EXPORT status fmi2SetInteger(instance *i, const reference at[], size_t n, const int values[]) {
-    for (size_t k = 0; k < n; k++) {
-        if (at[k] != SEED)
-            return said(i, "there is no Integer with this value reference");
-        if (said(i, set_seed(&i->state, values[k])) != OK)
+    for (size_t k = 0; k < n; k++)
+        if (set_whole(i, at[k], values[k]) != OK)
             return ERROR;
-    }
     return OK;
 }
 
 EXPORT status fmi2SetBoolean(instance *i, const reference at[], size_t n, const int values[]) {
     (void)at, (void)values;
-    return n ? said(i, "the model has no Boolean that can be set") : OK;
+    return without(i, n, "the model has no Boolean that can be set");
 }
 
 EXPORT status fmi2GetString(instance *i, const reference at[], size_t n, const char *values[]) {
     (void)at, (void)values;
-    return n ? said(i, "the model has no String") : OK;
+    return without(i, n, "the model has no String");
 }
 
 EXPORT status fmi2SetString(
     instance *i, const reference at[], size_t n, const char *const values[]) {
     (void)at, (void)values;
-    return n ? said(i, "the model has no String") : OK;
+    return without(i, n, "the model has no String");
 }
 
 EXPORT status fmi2GetFMUstate(instance *i, void **saved) {
-    if (!*saved)
-        *saved = malloc(sizeof i->state);
-    if (!*saved)
-        return said(i, "there is no memory for the state");
-    memcpy(*saved, &i->state, sizeof i->state);
-    return OK;
+    return copy_state(i, saved);
 }
 
 EXPORT status fmi2SetFMUstate(instance *i, void *saved) {
-    memcpy(&i->state, saved, sizeof i->state);
-    return OK;
+    return restore_state(i, saved);
 }
 
 EXPORT status fmi2FreeFMUstate(instance *i, void **saved) {
     (void)i;
-    free(*saved);
-    *saved = 0;
-    return OK;
+    return free_state(saved);
 }
 
 EXPORT status fmi2SerializedFMUstateSize(instance *i, void *saved, size_t *size) {
@@ -177,21 +154,12 @@ EXPORT status fmi2SerializedFMUstateSize(instance *i, void *saved, size_t *size)
 }
 
 EXPORT status fmi2SerializeFMUstate(instance *i, void *saved, char data[], size_t size) {
-    if (size < sizeof i->state)
-        return said(i, "the buffer is shorter than the state");
-    memcpy(data, saved, sizeof i->state);
-    return OK;
+    return write_state(i, saved, data, size);
 }
 
 EXPORT status fmi2DeSerializeFMUstate(
     instance *i, const char data[], size_t size, void **saved) {
-    if (size != sizeof i->state)
-        return said(i, "the data are not a state of this model");
-    *saved = malloc(size);
-    if (!*saved)
-        return said(i, "there is no memory for the state");
-    memcpy(*saved, data, size);
-    return OK;
+    return read_state(i, data, size, saved);
 }
 
 EXPORT status fmi2GetDirectionalDerivative(
@@ -204,13 +172,13 @@ EXPORT status fmi2GetDirectionalDerivative(
 EXPORT status fmi2SetRealInputDerivatives(
     instance *i, const reference at[], size_t n, const int order[], const double values[]) {
     (void)at, (void)order, (void)values;
-    return n ? said(i, "inputs are held for a control period") : OK;
+    return without(i, n, "inputs are held for a control period");
 }
 
 EXPORT status fmi2GetRealOutputDerivatives(
     instance *i, const reference at[], size_t n, const int order[], double values[]) {
     (void)at, (void)order, (void)values;
-    return n ? said(i, "the model has no derivatives of outputs") : OK;
+    return without(i, n, "the model has no derivatives of outputs");
 }
 
 EXPORT status fmi2DoStep(instance *i, double now, double step, int no_set_state) {

@@ -20,6 +20,8 @@ static status said(instance *i, const char *problem) {
     return ERROR;
 }
 
+#include "instance.h"
+
 EXPORT const char *fmi3GetVersion(void) {
     return "3.0";
 }
@@ -35,21 +37,15 @@ EXPORT instance *fmi3InstantiateCoSimulation(
     const char *name, const char *token, const char *resources, bool visible, bool logging,
     bool event_mode, bool early_return, const reference required[], size_t n, void *environment,
     log_message log, void *update) {
-    instance *i;
+    instance *i = instantiated(token);
     (void)name, (void)resources, (void)visible, (void)event_mode, (void)early_return;
     (void)required, (void)n, (void)update;
-    if (!token || strcmp(token, TOKEN) != 0) {
-        if (log)
-            log(environment, ERROR, "logStatusError", "the token is that of another model");
-        return 0;
-    }
-    i = malloc(sizeof *i);
-    if (!i)
-        return 0;
-    i->environment = environment;
-    i->log = log;
-    i->logging = logging;
-    restart(&i->state);
+    if (i) {
+        i->environment = environment;
+        i->log = log;
+        i->logging = logging;
+    } else if (log)
+        log(environment, ERROR, "logStatusError", "the token is that of another model");
     return i;
 }
 
@@ -82,9 +78,7 @@ EXPORT status fmi3EnterInitializationMode(
 }
 
 EXPORT status fmi3ExitInitializationMode(instance *i) {
-    begin(&i->state);
-    i->state.running = true;
-    return OK;
+    return finish_initialisation(i);
 }
 
 EXPORT status fmi3EnterConfigurationMode(instance *i) {
@@ -100,70 +94,53 @@ EXPORT status fmi3EnterEventMode(instance *i) {
 }
 
 EXPORT status fmi3EnterStepMode(instance *i) {
-    (void)i;
-    return OK;
+    return accepted(i);
 }
 
 EXPORT status fmi3Terminate(instance *i) {
-    (void)i;
-    return OK;
+    return accepted(i);
 }
 
 EXPORT status fmi3Reset(instance *i) {
-    restart(&i->state);
-    return OK;
+    return start_again(i);
 }
 
 EXPORT status fmi3GetFloat64(
     instance *i, const reference at[], size_t n, double values[], size_t n_values) {
     (void)n_values;
-    for (size_t k = 0; k < n; k++)
-        if (!get_real(&i->state, at[k], values + k))
-            return said(i, "there is no Float64 with this value reference");
-    return OK;
+    return get_reals(i, at, n, values);
 }
 
 EXPORT status fmi3SetFloat64(
     instance *i, const reference at[], size_t n, const double values[], size_t n_values) {
     (void)n_values;
-    for (size_t k = 0; k < n; k++)
-        if (said(i, set_real(&i->state, at[k], values[k])) != OK)
-            return ERROR;
-    return OK;
+    return set_reals(i, at, n, values);
 }
 
 EXPORT status fmi3GetBoolean(
     instance *i, const reference at[], size_t n, bool values[], size_t n_values) {
-    double value;
     (void)n_values;
-    for (size_t k = 0; k < n; k++) {
-        if (!get_real(&i->state, at[k], &value))
-            return said(i, "there is no Boolean with this value reference");
-        values[k] = value != 0.0;
-    }
+    for (size_t k = 0; k < n; k++)
+        if (get_flag(i, at[k], values + k) != OK)
+            return ERROR;
     return OK;
 }
 
 EXPORT status fmi3GetInt64(
     instance *i, const reference at[], size_t n, int64_t values[], size_t n_values) {
     (void)n_values;
-    for (size_t k = 0; k < n; k++) {
-        if (at[k] != SEED)
-            return said(i, "there is no Int64 with this value reference");
-        values[k] = i->state.seed;
-    }
+    for (size_t k = 0; k < n; k++)
+        if (get_whole(i, at[k], values + k) != OK)
+            return ERROR;
     return OK;
 }
 
 EXPORT status fmi3SetInt64(
     instance *i, const reference at[], size_t n, const int64_t values[], size_t n_values) {
     (void)n_values;
-    for (size_t k = 0; k < n; k++) {
-        if (at[k] != SEED)
-            return said(i, "there is no Int64 with this value reference");
-        if (said(i, set_seed(&i->state, values[k])) != OK)
+    for (size_t k = 0; k < n; k++)
+        if (set_whole(i, at[k], values[k]) != OK)
             return ERROR;
-    }
     return OK;
 }
 
@@ -171,12 +148,12 @@ EXPORT status fmi3SetInt64(
     EXPORT status fmi3Get##Kind(                                                             \
         instance *i, const reference at[], size_t n, type values[], size_t n_values) {       \
         (void)at, (void)values, (void)n_values;                                              \
-        return n ? said(i, "the model has no variable of type " #Kind) : OK;                 \
+        return without(i, n, "the model has no variable of type " #Kind);                 \
     }                                                                                        \
     EXPORT status fmi3Set##Kind(                                                             \
         instance *i, const reference at[], size_t n, const type values[], size_t n_values) { \
         (void)at, (void)values, (void)n_values;                                              \
-        return n ? said(i, "the model has no variable of type " #Kind) : OK;                 \
+        return without(i, n, "the model has no variable of type " #Kind);                 \
     }
 
 NONE(Float32, float)
@@ -192,41 +169,33 @@ NONE(String, char *)
 EXPORT status fmi3SetBoolean(
     instance *i, const reference at[], size_t n, const bool values[], size_t n_values) {
     (void)at, (void)values, (void)n_values;
-    return n ? said(i, "the model has no Boolean that can be set") : OK;
+    return without(i, n, "the model has no Boolean that can be set");
 }
 
 EXPORT status fmi3GetBinary(
     instance *i, const reference at[], size_t n, size_t sizes[], const void *values[], size_t m) {
     (void)at, (void)sizes, (void)values, (void)m;
-    return n ? said(i, "the model has no variable of type Binary") : OK;
+    return without(i, n, "the model has no variable of type Binary");
 }
 
 EXPORT status fmi3SetBinary(
     instance *i, const reference at[], size_t n, const size_t sizes[], const void *const values[],
     size_t m) {
     (void)at, (void)sizes, (void)values, (void)m;
-    return n ? said(i, "the model has no variable of type Binary") : OK;
+    return without(i, n, "the model has no variable of type Binary");
 }
 
 EXPORT status fmi3GetFMUState(instance *i, void **saved) {
-    if (!*saved)
-        *saved = malloc(sizeof i->state);
-    if (!*saved)
-        return said(i, "there is no memory for the state");
-    memcpy(*saved, &i->state, sizeof i->state);
-    return OK;
+    return copy_state(i, saved);
 }
 
 EXPORT status fmi3SetFMUState(instance *i, void *saved) {
-    memcpy(&i->state, saved, sizeof i->state);
-    return OK;
+    return restore_state(i, saved);
 }
 
 EXPORT status fmi3FreeFMUState(instance *i, void **saved) {
     (void)i;
-    free(*saved);
-    *saved = 0;
-    return OK;
+    return free_state(saved);
 }
 
 EXPORT status fmi3SerializedFMUStateSize(instance *i, void *saved, size_t *size) {
@@ -236,21 +205,12 @@ EXPORT status fmi3SerializedFMUStateSize(instance *i, void *saved, size_t *size)
 }
 
 EXPORT status fmi3SerializeFMUState(instance *i, void *saved, uint8_t data[], size_t size) {
-    if (size < sizeof i->state)
-        return said(i, "the buffer is shorter than the state");
-    memcpy(data, saved, sizeof i->state);
-    return OK;
+    return write_state(i, saved, data, size);
 }
 
 EXPORT status fmi3DeserializeFMUState(
     instance *i, const uint8_t data[], size_t size, void **saved) {
-    if (size != sizeof i->state)
-        return said(i, "the data are not a state of this model");
-    *saved = malloc(size);
-    if (!*saved)
-        return said(i, "there is no memory for the state");
-    memcpy(*saved, data, size);
-    return OK;
+    return read_state(i, data, size, saved);
 }
 
 EXPORT status fmi3DoStep(

@@ -15,19 +15,20 @@ family with several variants, the file also contains the choices (``mounting: le
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import hashlib
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import yaml
 
+from pam_envs import yaml_file
+from pam_envs.files import write_text
 from pam_envs.hysteresis import protocol
 from pam_envs.parameters import PROVENANCES, Declaration, declarations
+from pam_envs.wording import shown
 
 if TYPE_CHECKING:
     from pam_envs.plants.core.plant import Plant
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 P = TypeVar("P", bound="Plant")
 KEYS = ("schema", "family", "substeps", "parameters", "hysteresis", "ensemble", "notes")
 ENTRY_KEYS = ("value", "unit", "provenance", "source")
-_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def record(plant: Plant) -> dict[str, Any]:
@@ -114,42 +114,32 @@ def write(plant: Plant, path: Path, notes: Mapping[str, Any] | None = None) -> N
         data["notes"] = dict(notes)
     text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    with open(temporary, "w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(temporary, path)
+    write_text(path, text)
 
 
 def read(cls: type[P], path: Path) -> P:
     """Read a plant file; every error names the file, the key and the remedy."""
-    try:
-        with open(path, encoding="utf-8") as file:
-            data = yaml.load(file, Loader=_LOADER)
-    except OSError as error:
-        raise ValueError(f"plant file {path} cannot be read: {error.strerror or error}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ValueError(f"plant file {path} is not YAML: {error}") from error
+    data = yaml_file.read(path, "plant file")
     where = f"plant file {path}"
+    with yaml_file.naming(where):
+        return _checked(cls, data, where)
+
+
+def _checked(cls: type[P], data: Any, where: str) -> P:
     if not isinstance(data, Mapping):
         raise ValueError(f"{where}: must hold a mapping with the keys {', '.join(KEYS)}")
     keys = (*KEYS, *cls.choices)
     unknown = [str(k) for k in data if k not in keys]
     if unknown:
         rig = "; this looks like a rig file" if "plant" in data else ""
-        raise ValueError(f"{where}: unknown key {unknown[0]!r}{rig}; known: {', '.join(keys)}")
+        raise ValueError(f"{where}: unknown key {shown(unknown[0])}{rig}; known: {', '.join(keys)}")
     if data.get("schema") != 1:
-        raise ValueError(f"{where}: schema is {data.get('schema')!r}; this version reads schema 1")
+        raise ValueError(
+            f"{where}: schema is {shown(data.get('schema'))}; this version reads schema 1"
+        )
     if data.get("family") != cls.family:
-        raise ValueError(f"{where}: family is {data.get('family')!r}, expected {cls.family!r}")
-    try:
-        return _build(cls, data, where)
-    except (TypeError, AttributeError) as error:
-        raise ValueError(f"{where}: malformed: {error}") from error
-    except ValueError as error:
-        text = str(error)
-        raise type(error)(text if text.startswith(where) else f"{where}: {text}") from error
+        raise ValueError(f"{where}: family is {shown(data.get('family'))}, expected {cls.family!r}")
+    return _build(cls, data, where)
 
 
 def _build(cls: type[P], data: Mapping[str, Any], where: str) -> P:
@@ -162,11 +152,11 @@ def _build(cls: type[P], data: Mapping[str, Any], where: str) -> P:
         for name, d in declarations(getattr(cls(), c)).items()
     }
     if not isinstance(given, Mapping):
-        raise ValueError(f"{where}: parameters must be a mapping, got {given!r}")
+        raise ValueError(f"{where}: parameters must be a mapping, got {shown(given)}")
     for name, entry in given.items():
         if name not in known:
             raise ValueError(
-                f"{where}: unknown parameter {name!r}; known parameters: {', '.join(known)}"
+                f"{where}: unknown parameter {shown(name)}; known parameters: {', '.join(known)}"
             )
         values[name] = _entry(name, entry, known[name].unit, where)
         if isinstance(entry, Mapping) and "provenance" in entry:
@@ -198,23 +188,23 @@ def _entry(name: str, entry: Any, unit: str, where: str) -> float:
         unknown = [str(k) for k in entry if k not in ENTRY_KEYS]
         if unknown:
             raise ValueError(
-                f"{where}: {name} has an unknown key {unknown[0]!r}; known: {', '.join(ENTRY_KEYS)}"
+                f"{where}: {name} has an unknown key {shown(unknown[0])}; known: "
+                + ", ".join(ENTRY_KEYS)
             )
         if "value" not in entry:
             raise ValueError(f"{where}: {name} has no value; give value: in {unit}")
         value = entry["value"]
         if unit and entry.get("unit", unit) != unit:
             raise ValueError(
-                f"{where}: {name} is given in {entry['unit']!r}, expected {unit!r} (SI); convert it"
+                f"{where}: {name} is given in {shown(entry['unit'])}, expected {unit!r} (SI); "
+                "convert it"
             )
         if "provenance" in entry and entry["provenance"] not in PROVENANCES:
             raise ValueError(
-                f"{where}: {name} has provenance {entry['provenance']!r}; "
+                f"{where}: {name} has provenance {shown(entry['provenance'])}; "
                 f"choose one of {', '.join(PROVENANCES)}"
             )
-    if isinstance(value, str):  # YAML reads 1e5 without a sign as text
-        with contextlib.suppress(ValueError):
-            value = float(value)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError(f"{where}: {name} must be a number in {unit or 'SI'}, got {value!r}")
-    return float(value)
+    number = yaml_file.number(value)
+    if number is None:
+        raise ValueError(f"{where}: {name} must be a number in {unit or 'SI'}, got {shown(value)}")
+    return number

@@ -5,7 +5,7 @@ extended steps of the components. With all effects neutral the motion is that of
 plant uses the extended step when an effect is not neutral. The order is that of the signal::
 
     setpoint -> dead time -> regulator, supply, leak -> line -> threshold, hysteresis, friction
-    -> first cycles -> creep -> temperature -> law, load, viscosity, strands
+    -> first cycles -> yielding -> creep -> temperature -> law, load, viscosity, strands, yielding
     -> support, guide -> length creep -> mount -> sensors
 
 A setpoint below zero means that the valve is shut: the muscle keeps its air except for the leak;
@@ -22,6 +22,7 @@ from pam_envs.hysteresis.friction_effects import (
     creeps_on,
     friction_with_effects,
     newness,
+    yield_step,
 )
 from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import LANES, kernel, routine, scratch
@@ -38,6 +39,8 @@ from pam_envs.muscle.effects import (
     strands_on,
     temperature_factor,
     viscous_damping,
+    yield_deflections,
+    yield_forces,
 )
 from pam_envs.plants.core.sensors import begin_with_effects, effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
@@ -86,11 +89,22 @@ FINE_PARTS = 4
 
 
 @kernel
+def yield_to_pressure(rows: Any, fixed: Any, first: int, last: int, own: Any) -> None:
+    """Move the yielding friction of the pressure to the pressure reached."""
+    above = own[0]
+    for j in range(first, last):
+        above[j] = max(0.0, rows[R.PRESSURE][j] - fixed[R.HYSTERESIS_THRESHOLD][j])
+    yield_step(rows, fixed, EFFECTS_AT + S.yielding, R.HYSTERESIS_YIELD_WIDTH, first, last, above)
+
+
+@kernel
 def effective_pressure(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
-    elements: int, work: Any, left: Any, own: Any, creeps: int, worn: int,
+    elements: int, work: Any, left: Any, own: Any, creeps: int, worn: int, yields: int,
 ) -> None:  # fmt: skip
     """Compute the effective pressure from the pressure; ``left`` is that of the creep's step."""
+    if yields > 0:
+        yield_to_pressure(rows, fixed, first, last, own)
     pressure, drive = rows[R.PRESSURE], rows[R.DRIVE]
     true, friction, most = own[0], rows[EFFECTS_AT + S.friction], own[2]
     if STAGED > 0:
@@ -123,6 +137,8 @@ def effective_pressure(
             fixed[R.HYSTERESIS_PRESSURE_BEND][j],
         )
         drive[j] = true[j] - (1.0 + fixed[R.HYSTERESIS_FIRST_WIDTH][j] * new) * friction[j]
+    for j in range(first, last if yields > 0 else first):
+        drive[j] = drive[j] - fixed[R.HYSTERESIS_YIELD_WIDTH][j] * rows[EFFECTS_AT + S.yielding][j]
     if creeps > 0:
         for j in range(first, last):
             most[j] = 0.0
@@ -176,7 +192,7 @@ def settled(
         rows[EFFECTS_AT + S.kelvin][j] = fixed[R.MUSCLE_TEMPERATURE][j]
     creep_left(fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, first, last, own[1], left)
     effective_pressure(
-        rows, fixed, counts, table, hysteresis, first, last, elements, work, left, own, 1, 1
+        rows, fixed, counts, table, hysteresis, first, last, elements, work, left, own, 1, 1, 1
     )
 
 
@@ -274,6 +290,7 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     enclose_air(rows, fixed, j, 0.0)
     rows[EFFECTS_AT + S.travel][j] = 0.0
     rows[EFFECTS_AT + S.stuck][j] = 1.0
+    rows[EFFECTS_AT + S.deflection][j] = 0.0
     for k in range(4):
         rows[EFFECTS_AT + S.strands + k][j] = x / fixed[R.MUSCLE_REST_LENGTH][j]
     rows[EFFECTS_AT + S.kelvin][j] = fixed[R.MUSCLE_TEMPERATURE][j]
@@ -406,8 +423,9 @@ def mapped_pull(
 
 @kernel
 def forces(
-    rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, finer: int, maps: int
-) -> None:
+    rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int, deflects: int, finer: int,
+    maps: int,
+) -> None:  # fmt: skip
     """Write the linearised motion of a tile, the effective pressure going from ``was``.
 
     Rows 3 to 7 of ``own``, per unit mass: stiffness, push at the predicted middle, jerk, damping,
@@ -424,6 +442,13 @@ def forces(
         strand_forces(
             rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_1, R.MUSCLE_STRAND_BREAK, strain,
             rows[R.DRIVE], friction, sticking,
+        )  # fmt: skip
+    if deflects > 0:
+        for j in range(LANES):
+            strain[j] = 0.5 * h * v[j] / fixed[R.MUSCLE_REST_LENGTH][j]
+        yield_forces(
+            rows, fixed, EFFECTS_AT + S.deflection, R.MUSCLE_YIELD_FORCE, strain, rows[R.DRIVE],
+            friction, sticking,
         )  # fmt: skip
     if maps > 0:
         for j in range(LANES):
@@ -463,15 +488,17 @@ def write_motion(
 @kernel
 def move(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, was: Any,
-    h: float, own: Any, strands: int, sticks: int, mounts: int, stretches: int, finer: int,
-    maps: int,
+    h: float, own: Any, strands: int, deflects: int, sticks: int, mounts: int, stretches: int,
+    finer: int, maps: int,
 ) -> None:  # fmt: skip
     """Move the load of a tile for ``h`` seconds, the effective pressure going from ``was``."""
     x, v, stuck = rows[R.CONTRACTION], rows[R.VELOCITY], rows[EFFECTS_AT + S.stuck]
     before, width = own[0], own[1]
     springs, pushes, jerks, drags, lightness = own[3], own[4], own[5], own[6], own[7]
     hysteresis_ahead(rows, fixed, counts, table, hysteresis, 0, LANES, elements, 0.5 * h)
-    forces(rows, fixed, was, h, own, strands, finer, maps)
+    forces(rows, fixed, was, h, own, strands, deflects, finer, maps)
+    for j in range(LANES if deflects > 0 else 0):
+        before[j] = x[j]
     if sticks > 0:
         for j in range(LANES):
             dx, v[j], stuck[j] = stick_slip_step(
@@ -492,6 +519,12 @@ def move(
             width[j] = x[j] / fixed[R.MUSCLE_REST_LENGTH][j]
         slip_strands(
             rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_BREAK, width, rows[R.DRIVE]
+        )
+    if deflects > 0:
+        for j in range(LANES):
+            width[j] = (x[j] - before[j]) / fixed[R.MUSCLE_REST_LENGTH][j]
+        yield_deflections(
+            rows, fixed, EFFECTS_AT + S.deflection, R.MUSCLE_YIELD_FORCE, width, rows[R.DRIVE]
         )
     shown = rows[EFFECTS_AT + S.shown]
     for j in range(LANES):
@@ -568,6 +601,8 @@ def advance_extended(
         + count_on(fixed[R.MUSCLE_TEMPERATURE_GAIN], 0.0)
     )
     strands, sticks = strands_on(fixed, R.MUSCLE_STRAND_1), count_on(fixed[R.MASS_STICK], 0.0)
+    yields = count_on(fixed[R.HYSTERESIS_YIELD_WIDTH], 0.0)
+    deflects = count_on(fixed[R.MUSCLE_YIELD_FORCE], 0.0)
     maps = map_on(fixed, R.MUSCLE_MAP_05)
     fine = sticks + count_on(fixed[R.MUSCLE_VISCOSITY], 0.0)
     parts, finer = FINE_PARTS if fine > 0 else 1, finer_terms_on(fixed)
@@ -586,7 +621,7 @@ def advance_extended(
         own[9][j] = fixed[R.MUSCLE_BRAID_FORCE][j] / fixed[R.MUSCLE_BRAID_STRAIN][j]
     creep_left(fixed, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0, LANES, width, left)
     # pressures that follow from the setpoints alone are one interval ahead of the motion
-    leads = 1 if STAGED + flows + lines + worn == 0 else 0
+    leads = 1 if STAGED + flows + lines + worn + yields == 0 else 0
     if leads > 0:
         switch_substeps(switch, substeps, period, work[10], work[11])
     for i in range(substeps):
@@ -623,8 +658,10 @@ def advance_extended(
                 )
                 effective_pressure(
                     rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, left, own,
-                    creeps, worn,
+                    creeps, worn, yields,
                 )  # fmt: skip
+            elif yields > 0:
+                yield_to_pressure(rows, fixed, 0, LANES, own)
         if STAGED > 0 and flows > 0:
             for j in range(LANES):
                 width[j] = h if fixed[effects + AIR.flow][j] > 0.0 else 0.0
@@ -634,7 +671,7 @@ def advance_extended(
         if STAGED == 0 or flows > 0:
             effective_pressure(
                 rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, left, own,
-                creeps, worn,
+                creeps, worn, yields,
             )  # fmt: skip
         for j in range(LANES):
             end[j] = drive[j]
@@ -652,7 +689,7 @@ def advance_extended(
                     drive[j] = was[j] + (end[j] - was[j])
             move(
                 rows, fixed, counts, table, hysteresis, elements, was, h / parts, own, strands,
-                sticks, mounts, stretches, finer, maps,
+                deflects, sticks, mounts, stretches, finer, maps,
             )  # fmt: skip
             if flows > 0:
                 for j in range(LANES):

@@ -45,7 +45,7 @@ def strain_of_rest(
 ) -> float:  # fmt: skip
     """Return the strain at which the force falls to ``pull`` [N], with friction on the way there.
 
-    ``law`` has the parameters of :func:`_numbers`; ``stiffer`` is a factor on its passive force.
+    ``law`` has the parameters of :func:`law_numbers`; ``stiffer`` is a factor on its passive force.
     Newton's method, and bisection where a step leaves the bracket or is not half of the last.
     """
     below, above, e, last = LOWEST, HIGHEST, 0.05, 1.0
@@ -86,7 +86,7 @@ def rest_rows(
         )  # fmt: skip
 
 
-def _numbers(law: EffectiveAreaMuscle) -> Array:
+def law_numbers(law: EffectiveAreaMuscle) -> Array:
     """Return the parameters of the static law as :func:`strain_of_rest` reads them, a column."""
     return np.array(
         [
@@ -132,7 +132,7 @@ def strains_of_rest(
     w, f, s, most = (np.array(np.broadcast_to(v, shape)).reshape(size) for v in given)
     before = np.ascontiguousarray(np.broadcast_to(held, (*shape, n))).reshape(size, n)
     strain = np.empty(size)
-    rest_rows(w, f, s, _numbers(law), friction, most, *elements, before, strain)
+    rest_rows(w, f, s, law_numbers(law), friction, most, *elements, before, strain)
     return strain.reshape(shape)
 
 

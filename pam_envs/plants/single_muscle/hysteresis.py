@@ -11,6 +11,7 @@ from pam_envs.hysteresis.friction_effects import (
     FirstCycles,
     FrictionEffects,
     Threshold,
+    YieldEffects,
 )
 from pam_envs.hysteresis.protocol import HysteresisModel, operator_of
 from pam_envs.parameters import declarations, effect, identified
@@ -22,7 +23,9 @@ _FIT = "least squares on positioning2021, Tables 3-5"
 
 
 @dataclass(frozen=True)
-class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, OperatorComponent):
+class Hysteresis(
+    Threshold, FirstCycles, CreepEffects, YieldEffects, FrictionEffects, OperatorComponent
+):
     """Friction of braid and tube, driven by length or by pressure.
 
     *Length* (an operator of :mod:`pam_envs.hysteresis.slip`): the force of friction elements in
@@ -42,6 +45,7 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, Operator
         ("shape",),
         ("pressure_slope",),
         ("pressure_bend",),
+        ("yield_width", "yield_break", "yield_ratio"),
         ("first_width", "first_loss", "first_travel"),
         ("threshold",),
         ("friction", "limit_per_pressure", "limit_per_load"),

@@ -95,6 +95,8 @@ COSTLY = (
     tuple(f"muscle.creep_{k}" for k in (1, 2, 3, 4)),
     tuple(f"hysteresis.creep_{k}" for k in (1, 2, 3, 4)),
     tuple(f"muscle.strand_{k}" for k in (1, 2, 3, 4)),
+    ("hysteresis.yield_width",),
+    ("muscle.yield_force",),
     tuple(f"muscle.{name}" for name in MAP_SIZES),
     ("mass.stick", "muscle.viscosity"),
 )

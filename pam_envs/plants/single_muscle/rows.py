@@ -12,12 +12,14 @@ from pam_envs.hysteresis.friction_effects import (
     FirstCycles,
     FrictionEffects,
     Threshold,
+    YieldEffects,
 )
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import GuideEffects
 from pam_envs.mechanics.hanging_mass import MOUNT_STATE, MountEffects, SupportEffects
 from pam_envs.muscle.effects import (
     LengthCreepEffects,
+    LengthYieldEffects,
     LoadEffects,
     StaticMapEffects,
     StrandEffects,
@@ -32,11 +34,18 @@ from pam_envs.sensing.sensor import SENSOR
 
 _EFFECTS: dict[str, tuple[Any, ...]] = {
     "regulator": AIR._fields,
-    "hysteresis": (FrictionEffects, CreepEffects, "first_width", FirstCycles, Threshold),
+    "hysteresis": (
+        FrictionEffects,
+        CreepEffects,
+        "first_width",
+        FirstCycles,
+        Threshold,
+        YieldEffects,
+    ),
     "muscle": (
         *("area_curve", "softening", "stiffening"),
         *(TemperatureEffects, LoadEffects, LengthCreepEffects, StrandEffects, ViscosityEffects),
-        StaticMapEffects,
+        *(StaticMapEffects, LengthYieldEffects),
     ),
     "mass": ("carried", "load_error", SupportEffects, GuideEffects, MountEffects),
     "position": SENSOR._fields,
@@ -72,7 +81,8 @@ _ROWS = layout(
         **each("creep stretch strands", 4),
         **each("stuck shown"),
         "mount": len(MOUNT_STATE),
-        **each("kelvin hung hangs position"),
+        **each("kelvin hung hangs position deflection"),
+        **each("yielding", 2),
         "sensors": sensor_rows(2),
     },
 )

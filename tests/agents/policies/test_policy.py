@@ -2,6 +2,7 @@
 
 import dataclasses
 import io
+import itertools
 import json
 import os
 import pickle
@@ -244,9 +245,38 @@ def loop() -> Any:
     return graph([helper.make_node("Loop", ["m", ""], ["action"], body=inner)])
 
 
+def undeclared(kind: str) -> Any:
+    """Return a graph whose dynamic reshape is declared small in ``value_info``."""
+    shape = node("Cast", "observation", "shape", to=TensorProto.INT64)
+    nodes = [node("Flatten", target="flat"), node("Slice", "flat at to", "few"), shape]
+    if kind == "Reshape":
+        nodes += [node("Reshape", "observation shape", "wide")]
+    else:
+        nodes += [node("Reshape", "observation shape", "r"), node("MatMul", "r r", "wide")]
+    ends = [helper.make_tensor(n, TensorProto.INT64, (1,), [v]) for n, v in (("at", 0), ("to", 1))]
+    made = graph([*nodes, node("MatMul", "wide w")], [weights(), *ends])
+    for name in ("shape", "wide", "r"):
+        made.graph.value_info.append(info(name, shape=[1, 1]))
+    return made
+
+
+def long(kind: str, number: int, wide: bool) -> Any:
+    """Return a graph of a chain of operators, over values of 90,000 numbers a row if ``wide``."""
+    names = ["observation", *(f"v{i}" for i in range(number - 1)), "action"]
+    big = helper.make_tensor("b", TensorProto.FLOAT, (10, 90_000), b"\0" * 3_600_000, raw=True)
+    first = [node("MatMul", "observation b", "v0")] if wide else [node(kind, target="v0")]
+    rest = [node(kind, a, b) for a, b in itertools.pairwise(names[1:])]
+    return graph([*first, *rest], [big] if wide else [])
+
+
 @pytest.mark.parametrize(
     ("model", "message"),
     [
+        (undeclared("Reshape"), "not known in advance|do not fit"),
+        (undeclared("MatMul"), "not known in advance|do not fit"),
+        (long("Tanh", 501, False), "has 501 operators"),
+        (long("Tanh", 60_000, False), "has 60,000 operators"),
+        (long("Tanh", 20, True), "all values together"),
         (external("/tmp/weights.bin"), "are in another file"),
         (external("../weights.bin"), "are in another file"),
         (graph([node("PyOp", domain="evil")], domains=("", "evil")), "operators of evil"),

@@ -148,11 +148,11 @@ def test_yaml_cannot_run_code(tmp_path):
     marker = tmp_path / "ran"
     file = tmp_path / "bad.yaml"
     file.write_text(f"!!python/object/apply:os.system ['touch {marker}']\n")
-    with pytest.raises(SettingsError, match="cannot be read as YAML"):
+    with pytest.raises(SettingsError, match=r"is not YAML|is not text"):
         configs.read(file)
     assert not marker.exists()
     file.write_text("[" * 5_000)
-    with pytest.raises(SettingsError, match="cannot be read as YAML"):
+    with pytest.raises(SettingsError, match=r"is not YAML|is not text"):
         configs.read(file)
 
 

@@ -80,6 +80,24 @@ def test_a_killed_process_resumes_from_the_command_line(tmp_path):
     assert (folder / "policy.onnx").read_bytes() == whole
 
 
+def test_run_without_a_checkpoint_starts_again_and_says_so(tmp_path, capsys):
+    (tmp_path / "tensorboard").mkdir()  # of a process that was killed
+    config = tmp_path / "tiny.yaml"
+    config.write_text(yaml.safe_dump(tiny().as_dict()))
+    given = ["train", ID, "--seed", "3", "--config", str(config), "--out", str(tmp_path)]
+    assert main([*given, "--resume"]) == 0
+    assert "the training starts again" in capsys.readouterr().err.replace("\n", " ")
+    assert finished(tmp_path / "policy.onnx")["seed"] == 3
+
+
+def test_second_training_in_one_folder_is_refused(tmp_path, capsys):
+    with train.alone(tmp_path):
+        for more in ([], ["--resume"]):
+            assert main(["train", ID, "--out", str(tmp_path), *more]) == 2
+            assert "another process trains in" in capsys.readouterr().err
+    assert not (tmp_path / CHECKPOINT).exists()
+
+
 def test_damaged_or_foreign_checkpoint_is_refused(tmp_path):
     file = tmp_path / CHECKPOINT
     checkpoint.save(file, {"a": np.arange(300)})
@@ -112,18 +130,6 @@ def test_a_checkpoint_cannot_run_code(tmp_path):
             checkpoint.load(file)
         assert main(["train", ID, "--resume", "--out", str(tmp_path)]) == 2
     assert not marker.exists()
-
-
-def test_run_killed_before_its_first_checkpoint_starts_again(tmp_path, capsys):
-    config = tiny(checkpoint_steps=512)
-    killed_after(Run(config, 5, tmp_path), 128)
-    assert not (tmp_path / CHECKPOINT).exists()
-    assert main(["train", "--resume", "--out", str(tmp_path)]) == 0
-    said = " ".join(capsys.readouterr().err.split())
-    assert "no checkpoint in" in said
-    assert "starts again with its settings" in said
-    card = OnnxPolicy.load(tmp_path / "policy.onnx").card
-    assert (card["seed"], configs.from_mapping(card["config"])) == (5, config)
 
 
 def test_a_run_is_neither_overwritten_nor_resumed_with_other_settings(ppo, tmp_path, capsys):
@@ -261,3 +267,79 @@ def test_settings_chosen_by_hand_have_no_number_of_trials():
     assert json.loads(json.dumps(cost_of(by_hand, 7)))["tuning_trials"] is None
     searched = configs.changed(by_hand, ["search.trials=40"])
     assert cost_of(searched, 7)["tuning_trials"] == 40
+
+
+def leaves(value: Any, place: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return the places of all entries of nested dictionaries and lists."""
+    if not isinstance(value, (dict, list)):
+        return [place]
+    pairs = value.items() if isinstance(value, dict) else enumerate(value)
+    return [place, *(found for key, own in pairs for found in leaves(own, (*place, key)))]
+
+
+def tampered(value: Any, random: np.random.Generator) -> Any:
+    """Return a value of another structure, or one that is no number of a training."""
+    if isinstance(value, torch.Tensor) and value.numel() and random.random() < 0.7:
+        if value.is_floating_point() and random.random() < 0.5:
+            other = value.clone(memory_format=torch.contiguous_format)
+            other.view(-1)[int(random.integers(value.numel()))] = random.choice([np.nan, np.inf])
+            return other
+        return torch.cat([value.reshape(-1), value.reshape(-1)])
+    return [None, "text", [1, 2], {"a": 1}, np.nan, 10**30][int(random.integers(6))]
+
+
+@pytest.mark.parametrize("name", ["history", "residual_sac", "residual", "residual_recurrent"])
+def test_tampered_checkpoints_are_refused(name, tmp_path, short_run):
+    random = np.random.default_rng(0)
+    run = Run(kind(name), 3, tmp_path)
+    whole = short_run(name)[1] / CHECKPOINT
+    content = checkpoint.load(whole)
+    checkpoint.save(run.checkpoint, content)
+    assert train.resume(run).num_timesteps == 1024
+    places = [place for place in leaves(content["snapshot"]) if place]
+    for place in [places[i] for i in random.choice(len(places), 40)]:
+        content = checkpoint.load(whole)
+        at = content["snapshot"]
+        for key in place[:-1]:
+            at = at[key]
+        if isinstance(at, dict) and place[-2:-1] != ("state",) and random.random() < 0.3:
+            del at[place[-1]]
+        else:
+            at[place[-1]] = [tampered(at[place[-1]], random), "text"][at[place[-1]] is None]
+        checkpoint.save(run.checkpoint, content)
+        with pytest.raises(CheckpointError):
+            train.resume(run)
+            raise AssertionError(f"{place} is {at.get(place[-1]) if isinstance(at, dict) else at}")
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "value"),
+    [
+        ("history", ("replay",), "text"),
+        ("residual_sac", ("parameters", "ent_coef_optimizer", "state", 0, "exp_avg_sq"), None),
+    ],
+)
+def test_checkpoint_of_another_algorithm_or_optimizer_is_refused(
+    name, place, value, tmp_path, short_run
+):
+    content = checkpoint.load(short_run(name)[1] / CHECKPOINT)
+    *path, last = place
+    at = content["snapshot"]
+    for key in path:
+        at = at[key]
+    del at[last]
+    if value is not None:
+        at[last] = value
+    run = Run(kind(name), 3, tmp_path)
+    checkpoint.save(run.checkpoint, content)
+    with pytest.raises(CheckpointError):
+        train.resume(run)
+
+
+@pytest.mark.parametrize(("key", "value"), [("counts", 2**40), ("rows", np.nan), ("fixed", 1e9)])
+def test_checkpoint_with_a_state_beyond_its_bounds_is_refused(key, value, tmp_path, ppo, capsys):
+    content = checkpoint.load(ppo[1] / CHECKPOINT)
+    content["snapshot"]["env"][f"0/{key}"][0, 4, 0] = value
+    checkpoint.save(tmp_path / CHECKPOINT, content)
+    assert main(["train", ID, "--resume", "--out", str(tmp_path)]) == 2
+    assert "does not fit its settings" in capsys.readouterr().err

@@ -103,7 +103,7 @@ def decisions(rule: Rule) -> Json:
         blocks = Blocks.make(TIME, measured)
         problem = Problem(line.simulate, measured, noise, blocks.train, TIME)
         frees = (line.free("gain"), line.free("lag"))
-        base = fit_base(problem, blocks, line.column, frees)
+        base = fit_base(problem, blocks, line.column, [frees])
         clean = line.simulate(np.array([truth]))[:, :, 0]
         command = 1e5 * clean[1]
         regressors = Regressors.make(

@@ -18,7 +18,8 @@ RULE = Rule()
 
 
 def left(excess: float = 1.0, r2: float = 0.0, peak: float = 4.0) -> dict[str, Any]:
-    return {"excess": excess, "r2": [r2, 0.0], "peak": peak, "rest": 0.0}
+    found = {"excess": excess, "by_channel": [excess, 0.0], "r2": [r2, 0.0]}
+    return found | {"peak": peak, "rest": 0.0}
 
 
 def rival(*names: str, gain: float, better: float = 0.0, **marks: bool) -> dict[str, Any]:

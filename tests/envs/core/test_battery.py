@@ -160,7 +160,7 @@ def test_state_of_other_arguments_is_refused(name: str) -> None:
     before = env.get_state()
     with pytest.raises(ValueError, match="taken with other arguments"):
         env.set_state(other.get_state())
-    with pytest.raises(ValueError, match="has no 'rows'"):
+    with pytest.raises(ValueError, match="has no 'steps'"):
         env.set_state({})
     for part, value, message in (
         ("rows", np.nan, "'rows' hold nan"),

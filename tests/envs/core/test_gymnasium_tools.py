@@ -73,6 +73,25 @@ def test_state_of_a_batch_in_next_step_mode_includes_the_ended_rows():
     assert (other.step(zeros)[4]["time"] == 0.01).all()
 
 
+def test_state_with_ended_rows_is_refused_where_no_row_can_have_ended():
+    env, other = batch(), batch(AutoresetMode.SAME_STEP)
+    env.reset(seed=0)
+    for action in actions(STEPS):
+        env.step(action)
+    state = env.get_state()
+    assert state["ended"].all()
+    before = other.get_state()
+    for refuses, given in (
+        (other, state),
+        (batch(), {**before, "ended": state["ended"]}),
+        (batch(), {**state, "ended": state["ended"].astype(float)}),
+        (batch(), {**state, "ended": state["ended"][:2]}),
+    ):
+        with pytest.raises(ValueError, match="the state's 'ended'"):
+            refuses.set_state(given)
+    assert all((other.get_state()[key] == value).all() for key, value in before.items())
+
+
 def test_disabled_mode_refuses_steps_of_ended_rows():
     env = batch(AutoresetMode.DISABLED)
     env.reset(seed=0)

@@ -2,7 +2,8 @@
 
 Threads of the braid slide on one another as the muscle contracts. In a hysteresis of the pressure
 they slide even in a blocked muscle, where they are in fact at rest. The plant has four Maxwell
-elements in the length, which break away one after the other and act against the motion.
+elements in the length, which break away one after the other and act against the motion. In the
+second form one element yields smoothly (Bouc and Wen), so that its minor loops do not close.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
@@ -17,6 +18,15 @@ CAUSE = Cause(
                 *(Term(f"muscle.strand_{k}", (0.5, 2.0), scale=1.0) for k in (1, 2, 3, 4)),
                 Term("muscle.strand_break", (0.02,), log=True, amount=False, prior=1.5),
                 Term("muscle.strand_per_pressure", (0.0,), scale=1e-6, amount=False, prior=8.0),
+            ),
+        ),
+        Form(
+            "yielding",
+            (
+                Term("muscle.yield_force", (3.0,), scale=1.0),
+                Term("muscle.yield_per_pressure", (0.0,), scale=1e-5, amount=False),
+                Term("muscle.yield_break", (0.01, 0.03), log=True, amount=False),
+                Term("muscle.yield_ratio", (0.5,), scale=0.3, amount=False),
             ),
         ),
     ),

@@ -1,0 +1,1 @@
+"""Classical controllers as kernels, for export to C, WebAssembly and FMU."""

@@ -1,0 +1,1 @@
+"""Study of the diagnosis over simulated worlds that it was not developed on."""
