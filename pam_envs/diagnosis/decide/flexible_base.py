@@ -62,6 +62,12 @@ def shapes_of(recording: Recording, sheet: Rig) -> Array:
     return np.array(made)
 
 
+def together(forms: Sequence[Form]) -> Form:
+    """Return the form with the terms of several forms."""
+    terms = {term.name: term for form in forms for term in form.terms}
+    return Form(" and ".join(form.name for form in forms), tuple(terms.values()))
+
+
 @dataclass(frozen=True)
 class FlexibleBase:
     """Selection of the common differences on a fitted base."""
@@ -75,7 +81,7 @@ class FlexibleBase:
     rate: Form | None = None  # form of the limited rate that the pressure needs
 
     def chosen(self, causes: Sequence[Cause]) -> list[tuple[Cause, Form]]:
-        """Return the common differences that the base lacks, each in one form.
+        """Return the common differences that the base lacks, each in the form of all its forms.
 
         A limited rate is among them where the pressure alone has shown it.
         """
@@ -85,7 +91,7 @@ class FlexibleBase:
             rate = next((form for form in cause.forms if form is self.rate), None)
             if cause.in_valve and rate is None:
                 continue
-            form = rate or cause.forms[0]
+            form = rate or together(cause.forms)
             if not any(t.name in known for t in form.terms):
                 made.append((cause, form))
         return made
@@ -97,7 +103,7 @@ class FlexibleBase:
         begins = [(plain.z, k, {}) for k in range(STARTS)]
         if self.guess:
             guessed = [f.inner(f.within(self.guess.get(f.name, f.start))) for f in plain.frees]
-            begins.append((np.array(guessed), 0, self.guess))
+            begins.append((np.array(guessed), 0, self.absent(causes) | self.guess))
         for begin, k, guess in begins:
             frees = tuple(
                 free
@@ -119,6 +125,12 @@ class FlexibleBase:
         lsq.improve(self.problem, [best], ROUNDS, 1e-3)
         errors = self.blocks.errors(self.problem.rows(best.residual))
         return Candidate(tuple(causes), best, errors)
+
+    def absent(self, causes: Sequence[tuple[Cause, Form]]) -> dict[str, float]:
+        """Return the values of amounts at which causes have no effect."""
+        neutral = self.family.column
+        amounts = [t for _, form in causes for t in form.terms if t.amount]
+        return {t.name: float(neutral[self.family.free(t.name).place]) for t in amounts}
 
     def needed(self, model: Candidate) -> Candidate:
         """Return a model without the common differences that the recording does not need.

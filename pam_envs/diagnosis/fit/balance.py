@@ -5,7 +5,9 @@ outputs. Errors of force are weighed by the compliance, so that the regression m
 contraction. The result only starts a fit, since the regressors contain noise.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -17,17 +19,25 @@ from pam_envs.arrays import Array, Indices
 from pam_envs.constants import GRAVITY
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.kernels.build import entry
+from pam_envs.kernels.yielding import deflected
 from pam_envs.muscle.effective_area import MAP_SIZES
 from pam_envs.muscle.effects import BREAKS, MAP_TERMS
 
 SLOW = 0.008  # speed [m/s] below which a sample is an equilibrium of forces
 FEWEST, MOST = 200, 4000  # least and largest number of samples
-ROUNDS = 3
-LEAST_STIFF = 100.0  # least stiffness over strain [N] of a weight
-BREAK_AWAYS, GROWTHS = (0.01, 0.03, 0.09), (0.0, 4e-6, 1.5e-5)
-"""Tried strains at which the last strand breaks away, and growths with pressure [1/Pa]."""
-STRAND_GAIN = 0.03
-"""Relative decrease of the squared error that strands need."""
+ROUNDS = 4
+USUAL_STIFF = 2000.0  # stiffness over strain [N] of the first weights
+LEAST_STIFF = 0.15  # least stiffness of a weight, over the median
+BREAKS_IN_LENGTH, GROWTHS = (0.003, 0.01, 0.03, 0.09), (0.0, 4e-6, 1.5e-5)
+"""Tried strains over which friction of the length builds up, and its growths with pressure
+[1/Pa]."""
+BREAKS_IN_PRESSURE = (1e4, 3e4, 1e5)
+"""Tried pressures over which friction of the pressure yields [Pa]."""
+RATIOS = (0.0, 1.0)
+"""Tried ratios of yielding elements: springs back, friction of Dahl."""
+LEAST_GAIN = 0.03
+"""Relative decrease of the squared error that a further friction needs."""
 MAP_PRIOR = 20.0
 """Standard deviation of a term of the map [N]."""
 LAW = (
@@ -42,6 +52,43 @@ LAW = (
 )
 
 
+@entry
+def slipping(path: Array, span: Array, made: Array) -> None:
+    """Write the deflections of a Maxwell element along a path (T,), at most ``span`` (T,)."""
+    slip = path[0]
+    for k in range(len(path)):
+        made[k] = min(max(path[k] - slip, -span[k]), span[k])
+        slip = path[k] - made[k]
+
+
+@entry
+def yielding(path: Array, span: Array, ratio: float, made: Array) -> None:
+    """Write the deflections of a yielding element along a path (T,), at most ``span`` (T,)."""
+    made[0] = 0.0
+    for k in range(1, len(path)):
+        made[k] = deflected(made[k - 1], path[k] - path[k - 1], span[k], ratio)[0]
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Friction with a given course, which a regression may add."""
+
+    kind: str
+    columns: Array  # (k, n): forces against the motion per coefficient
+    names: tuple[str, ...]  # of the coefficients, (k,)
+    fixed: dict[str, float]  # other parameters
+    growth: str = ""  # parameter that grows with the first coefficient
+    per: float = 0.0  # the growth, over the coefficient
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Coefficients of a regression."""
+
+    coefficients: Array
+    error: float  # squared error of the contraction, over the noise
+
+
 @dataclass(frozen=True)
 class Balance:
     """Slow samples of a recording."""
@@ -52,6 +99,7 @@ class Balance:
     pressure: Array  # (n,) [Pa]
     force: Array  # (n,): weight of the load [N]
     gaps: Array  # (plays, n): pressure less play output [Pa]
+    speed: Array  # (n,): of the strain [1/s]
     path: Array  # (T,): strain, smoothed
     drive: Array  # (T,): pressure [Pa]
     noise: float  # of the contraction [m]
@@ -72,100 +120,126 @@ class Balance:
         window = max(3, round(0.1 / period))
         known = np.interp(np.arange(len(load)), np.flatnonzero(usable), contraction[usable])
         smooth = uniform_filter1d(known, window)
-        pace = np.abs(np.gradient(smooth, period))
-        rows = np.flatnonzero(usable & (uniform_filter1d(pace, window) < SLOW))
+        speed = np.gradient(smooth, period)
+        rows = np.flatnonzero(usable & (uniform_filter1d(np.abs(speed), window) < SLOW))
         if len(rows) < FEWEST:
             return None
         rows = rows[:: max(1, len(rows) // MOST)]
         thresholds: tuple[float, ...] = plant.hysteresis.model.thresholds  # type: ignore[attr-defined]
         plays = [PlayOperator((size,), (1.0,), 0.0).simulate(pressure)[0] for size in thresholds]
         gaps = (pressure - np.reshape(plays, (len(thresholds), len(pressure))))[:, rows]
-        path = smooth / plant.muscle.rest_length
-        force = load[rows] * GRAVITY
-        return cls(family, rows, path[rows], pressure[rows], force, gaps, path, pressure, noise)
+        path, force = smooth / plant.muscle.rest_length, load[rows] * GRAVITY
+        speed = (speed / plant.muscle.rest_length)[rows]
+        near = path[rows], pressure[rows], force, gaps, speed
+        return cls(family, rows, *near, path, pressure, noise)
 
     def solve(self) -> dict[str, float]:
         """Return coefficients of the static law and play weights."""
-        return self._solved(False, None)[0]
+        return self._named(self._plain[0].coefficients)
+
+    @cached_property
+    def _plain(self) -> tuple[Solution, Array, Array]:
+        """Solution of law and plays, with its taper and its stiffness over strain [N], (n,)."""
+        taper, stiff = np.zeros(len(self.strain)), np.full(len(self.strain), USUAL_STIFF)
+        for _ in range(ROUNDS):
+            columns = np.vstack([self._law(), self._plays(taper), self._late(stiff)])
+            found = _Regression(columns, self.force, self._weights(stiff)).solve(
+                np.arange(len(columns)), self._lowest(), np.zeros(len(columns))
+            )
+            taper, stiff = self._slopes(found.coefficients)
+        return found, taper, stiff
 
     def flexible(self) -> dict[str, float]:
-        """Return coefficients with the map, and with strands if they reduce the error."""
-        best, least = self._solved(True, None)
-        least *= 1.0 - STRAND_GAIN
-        for away, growth in product(BREAK_AWAYS, GROWTHS):
-            found, error = self._solved(True, self.slips(away, growth))
-            if error < least:
-                best, least = found, error
-                best |= {"muscle.strand_break": away, "muscle.strand_per_pressure": growth}
-        return best
+        """Return coefficients with the map, and with the friction that reduces the error.
 
-    def slips(self, away: float, growth: float) -> Array:
-        """Return the strands' forces over their slip forces without pressure, (strands, n)."""
-        spans = np.outer(BREAKS, away * (1.0 + growth * self.drive))
-        slip = np.full(len(BREAKS), self.path[0])
-        made: Array = np.empty((len(self.path), len(BREAKS)))
-        for k, (strain, span) in enumerate(zip(self.path, spans.T, strict=True)):
-            gap = np.minimum(np.maximum(strain - slip, -span), span)
-            slip = strain - gap
-            made[k, :] = gap
-        return np.asarray(made[self.rows].T / (np.array(BREAKS)[:, None] * away))
+        Friction of each kind is added as long as it helps: strands and yielding elements.
+        """
+        _, taper, stiff = self._plain
+        maps, tried = self._terms(), list(self._frictions(taper))
+        always = [self._law(), self._plays(taper), self._late(stiff), maps]
+        columns = np.vstack([*always, *(f.columns for f in tried)])
+        regression = _Regression(columns, self.force, self._weights(stiff))
+        first = sum(len(part) for part in always)
+        ends = np.cumsum([first, *(len(f.columns) for f in tried)])
+        precision = np.zeros(len(columns))
+        precision[first - len(maps) : first] = MAP_PRIOR**-2
+        low = np.full(len(columns), 0.0)
+        low[:first] = np.append(self._lowest(), np.full(len(maps), -np.inf))
+        chosen: list[int] = []
 
-    def _solved(self, maps: bool, strands: Array | None) -> tuple[dict[str, float], float]:
-        """Return the coefficients, and the squared error of the contraction over the noise."""
-        law, e, p = self.family.plant.muscle, self.strain, self.pressure
-        bend = -np.expm1(-e / law.braid_strain)
-        passive = [-bend, -e, -(e**2), -(e**3), -(e**4)]
-        more = list(self._terms()) if maps else []
-        rubs = [] if strands is None else list(-strands)
-        n, plays = len(LAW), len(self.gaps)
-        low = np.full(n + plays + len(more) + len(rubs), -np.inf)
-        low[[0, 3]] = 0.0
-        low[n : n + plays] = 0.0
-        low[n + plays + len(more) :] = 0.0
-        taper, stiff = np.zeros(len(e)), np.full(len(e), 20.0 * LEAST_STIFF)
-        spread = np.full(len(low), np.inf)
-        spread[n + plays : n + plays + len(more)] = MAP_PRIOR
-        c, error = np.zeros(len(low)), np.inf
-        for _ in range(ROUNDS):
-            columns = np.array(
-                [p, -e * p, -(e**2) * p, *passive, *(-self.gaps * (1.0 - taper)), *more, *rubs]
-            ).T
-            weight = law.rest_length / (stiff * self.noise)
-            matrix = np.vstack([columns * weight[:, None], np.diag(1.0 / spread)])
-            target = np.append(self.force * weight, np.zeros(len(low)))
-            scale = np.linalg.norm(matrix, axis=0) + 1e-12
-            whole = np.column_stack([matrix / scale, target])
-            upper = np.asarray(np.linalg.qr(whole, mode="r"))
-            solved = lsq_linear(
-                upper[:, :-1], upper[:, -1], (low, np.full(len(low), np.inf)), method="bvls"
-            )
-            c, error = solved.x / scale, 2.0 * float(solved.cost)
-            area = max(c[0], 1e-6)
-            taper = np.clip((c[1] * e + c[2] * e**2) / area, -1.0, 0.95)
-            slope = (c[1] + 2.0 * c[2] * e) * p + c[3] / law.braid_strain * (1.0 - bend)
-            slope += c[4] + 2.0 * c[5] * e + 3.0 * c[6] * e**2 + 4.0 * c[7] * e**3
-            stiff = np.maximum(slope, LEAST_STIFF)
-        return self._named(c, maps, strands is not None), error
+        def places(of: list[int]) -> Indices:
+            """Return the columns of the law, the map and some kinds of friction."""
+            parts = [np.arange(ends[k], ends[k + 1]) for k in of]
+            return np.concatenate([np.arange(first), *parts])
 
-    def _named(self, c: Array, maps: bool, strands: bool) -> dict[str, float]:
-        """Return coefficients by parameter."""
-        area, n, plays = max(c[0], 1e-6), len(LAW), len(self.gaps)
-        found = dict(zip(LAW, map(float, c), strict=False))
-        found |= {
-            "muscle.area": area,
-            "muscle.area_taper": float(c[1]) / area,
-            "muscle.area_curve": float(c[2]) / area,
-            "muscle.braid_force": max(float(c[3]), 1e-3),
-        }
-        found |= {f"hysteresis.weight[{k}]": float(c[n + k]) / area for k in range(plays)}
-        at = n + plays
-        if maps:
-            sizes = zip(MAP_SIZES, c[at : at + len(MAP_SIZES)], strict=True)
-            found |= {f"muscle.{name}": float(size) for name, size in sizes}
-            at += len(MAP_SIZES)
-        if strands:
-            found |= {f"muscle.strand_{k + 1}": float(v) for k, v in enumerate(c[at:])}
+        best = regression.solve(places(chosen), low, precision)
+        while True:
+            used = {tried[k].kind for k in chosen}
+            further = [k for k, f in enumerate(tried) if f.kind not in used]
+            solved = {k: regression.solve(places([*chosen, k]), low, precision) for k in further}
+            if not solved:
+                break
+            least = min(solved, key=lambda k: solved[k].error)
+            if solved[least].error > (1.0 - LEAST_GAIN) * best.error:
+                break
+            chosen.append(least)
+            best = solved[least]
+        c = best.coefficients
+        found = self._named(c[: first - len(maps)])
+        sizes = zip(MAP_SIZES, c[first - len(maps) : first], strict=True)
+        found |= {f"muscle.{name}": float(size) for name, size in sizes}
+        at = first
+        for friction in (tried[k] for k in chosen):
+            values = c[at : at + len(friction.names)]
+            found |= friction.fixed | dict(zip(friction.names, map(float, values), strict=True))
+            if friction.growth:
+                found[friction.growth] = friction.per * float(values[0])
+            at += len(values)
+        if "hysteresis.yield_width" in found:
+            found["hysteresis.yield_width"] /= found["muscle.area"]
         return found
+
+    def _frictions(self, taper: Array) -> Iterator[Friction]:
+        """Yield friction with all tried courses."""
+        made = np.empty(len(self.path))
+        for away, growth in product(BREAKS_IN_LENGTH, GROWTHS):
+            span, columns = away * (1.0 + growth * self.drive), []
+            for part in BREAKS:
+                slipping(self.path, part * span, made)
+                columns.append(made[self.rows] / (part * away))
+            names = tuple(f"muscle.strand_{k + 1}" for k in range(len(BREAKS)))
+            fixed = {"muscle.strand_break": away, "muscle.strand_per_pressure": growth}
+            yield Friction("strands", -np.array(columns), names, fixed)
+            for ratio in RATIOS:
+                yielding(self.path, span, ratio, made)
+                name = "muscle.yield_"
+                yield Friction(
+                    "length",
+                    -made[None, self.rows] / away,
+                    (f"{name}force",),
+                    {f"{name}break": away, f"{name}ratio": ratio},
+                    f"{name}per_pressure",
+                    growth,
+                )
+        for away, ratio in product(BREAKS_IN_PRESSURE, RATIOS):
+            yielding(self.drive, np.full(len(self.drive), away), ratio, made)
+            fixed = {"hysteresis.yield_break": away, "hysteresis.yield_ratio": ratio}
+            column = -made[None, self.rows] / away * (1.0 - taper)
+            yield Friction("pressure", column, ("hysteresis.yield_width",), fixed)
+
+    def _law(self) -> Array:
+        """Return the terms of the static law, in the order of :data:`LAW`, (terms, n)."""
+        e, p = self.strain, self.pressure
+        bend = -np.expm1(-e / self.family.plant.muscle.braid_strain)
+        return np.array([p, -e * p, -(e**2) * p, -bend, -e, -(e**2), -(e**3), -(e**4)])
+
+    def _plays(self, taper: Array) -> Array:
+        """Return the friction of each play, (plays, n)."""
+        return np.asarray(-self.gaps * (1.0 - taper))
+
+    def _late(self, stiff: Array) -> Array:
+        """Return the forces of a viscous loss and of readings that come late, (2, n)."""
+        return np.array([self.speed, self.speed * stiff])
 
     def _terms(self) -> Array:
         """Return the terms of the map, (terms, n)."""
@@ -173,3 +247,58 @@ class Balance:
         u = np.clip(2.0 * self.pressure / law.map_pressure - 1.0, -1.0, 1.0)
         s = np.clip(2.0 * self.strain / law.map_strain - 1.0, -1.0, 1.0)
         return np.array([chebval(u, eye[i]) * chebval(s, eye[j]) for i, j in MAP_TERMS])
+
+    def _lowest(self) -> Array:
+        """Return the least coefficients of law and plays."""
+        low = np.full(len(LAW) + len(self.gaps), -np.inf)
+        low[[0, 3]] = 0.0
+        low[len(LAW) :] = 0.0
+        return np.append(low, [-np.inf, -np.inf])
+
+    def _weights(self, stiff: Array) -> Array:
+        """Return the contraction by force, over the noise, (n,)."""
+        floor = LEAST_STIFF * float(np.median(stiff))
+        weights = self.family.plant.muscle.rest_length / (np.maximum(stiff, floor) * self.noise)
+        return np.asarray(weights)
+
+    def _slopes(self, c: Array) -> tuple[Array, Array]:
+        """Return the taper of the area and the stiffness over strain [N] of a static law."""
+        law, e, p = self.family.plant.muscle, self.strain, self.pressure
+        bend = np.exp(-e / law.braid_strain)
+        taper = np.clip((c[1] * e + c[2] * e**2) / max(c[0], 1e-6), -1.0, 0.95)
+        stiff = (c[1] + 2.0 * c[2] * e) * p + c[3] / law.braid_strain * bend
+        stiff += c[4] + 2.0 * c[5] * e + 3.0 * c[6] * e**2 + 4.0 * c[7] * e**3
+        return taper, np.maximum(stiff, 1.0)
+
+    def _named(self, c: Array) -> dict[str, float]:
+        """Return coefficients of law and plays by parameter."""
+        area, n = max(c[0], 1e-6), len(LAW)
+        found = dict(zip(LAW, map(float, c), strict=False))
+        found |= {
+            "muscle.area": area,
+            "muscle.area_taper": float(c[1]) / area,
+            "muscle.area_curve": float(c[2]) / area,
+            "muscle.braid_force": max(float(c[3]), 1e-3),
+        }
+        plays = c[n : n + len(self.gaps)]
+        return found | {f"hysteresis.weight[{k}]": float(v) / area for k, v in enumerate(plays)}
+
+
+class _Regression:
+    """Least squares on columns with bounds, for many choices of them."""
+
+    def __init__(self, columns: Array, target: Array, weights: Array) -> None:
+        self.scale = np.linalg.norm(columns * weights, axis=1) + 1e-12
+        whole = np.vstack([columns / self.scale[:, None], target]) * weights
+        upper = np.asarray(np.linalg.qr(whole.T, mode="r"))
+        self.matrix, self.target = upper[:, :-1], upper[:, -1]
+
+    def solve(self, places: Indices, low: Array, precision: Array) -> Solution:
+        """Return the coefficients of some columns, within lower bounds and with a prior."""
+        scale = self.scale[places]
+        prior = np.diag(np.sqrt(precision[places]) / scale)[precision[places] > 0.0]
+        matrix = np.vstack([self.matrix[:, places], prior])
+        target = np.append(self.target, np.zeros(len(prior)))
+        bounds = low[places] * scale, np.full(len(places), np.inf)
+        solved = lsq_linear(matrix, target, bounds, method="bvls")
+        return Solution(solved.x / scale, 2.0 * float(solved.cost))

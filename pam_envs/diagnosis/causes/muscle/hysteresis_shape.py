@@ -38,4 +38,5 @@ CAUSE = Cause(
     settled="whole cycles hold no minor loops",
     sensor="a load cell at a blocked length, for the part that is not driven by length",
     compensable=True,
+    common=True,
 )
