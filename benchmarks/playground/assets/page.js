@@ -28,7 +28,7 @@ const digits = (value) => (Number.isFinite(value) ? value.toPrecision(3) : "–"
 
 // Show why the page does not show a run.
 function fail(error) {
-  one("fault").textContent = `${error?.message ?? error}. Reset the settings or load the page again; ` +
+  one("fault").textContent = `This run failed: ${error?.message ?? error}. Reset the settings or load the page again; ` +
     "it needs a browser from May 2023 or later.";
   one("fault").hidden = false;
 }
@@ -198,9 +198,9 @@ async function compare(turn) {
       element("td", {}, button), element("td", { class: "number" }, digits(rms) + (ended ? " *" : "")),
       element("td", { class: "wide" }, bar));
   }));
-  const gate = about().gate.length ? ", in stance (not shaded)" : "";
-  one("note").textContent = `In this episode, after ${about().settled} s${gate}.` +
-    (scored.some(([, score]) => score.ended) ? " * ended early by a limit." : "");
+  const gate = about().gate.length ? ", in stance only (not shaded)" : "";
+  one("note").textContent = `Errors in this episode from ${about().settled} s on${gate}.` +
+    (scored.some(([, score]) => score.ended) ? " * Ended early by a limit." : "");
   writeAddress(page.settings);
   document.body.dataset.compared = fragment(page.settings);
 }

@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -66,7 +66,8 @@ class Browser:
             self._child.kill()
             self._child.wait()
         self._back.close()
-        self._out.close()
+        with suppress(BrokenPipeError):
+            self._out.close()
 
     @contextmanager
     def page(self, address: str) -> Iterator["Page"]:
@@ -92,13 +93,18 @@ class Browser:
             As soon as the page of this session fails.
         TimeoutError
             If there is no answer within the limit.
+        OSError
+            If the browser has ended.
         """
         self._last += 1
         message = {"id": self._last, "method": method, "params": parameters}
         if session:
             message["sessionId"] = session
-        self._out.write(json.dumps(message).encode() + b"\0")
-        self._out.flush()
+        try:
+            self._out.write(json.dumps(message).encode() + b"\0")
+            self._out.flush()
+        except BrokenPipeError:
+            raise OSError(self._ended()) from None
         end = time.monotonic() + self.limit
         while True:
             answer = json.loads(self._read(end, method))
@@ -109,6 +115,10 @@ class Browser:
                     raise ValueError(f"{method}: {answer['error']['message']}")
                 return answer["result"]
 
+    def _ended(self) -> str:
+        """Return the end of what the browser has printed."""
+        return f"the browser has ended:\n{self._log.read_text()[-2000:]}"
+
     def _read(self, end: float, method: str) -> bytes:
         """Return the next message."""
         while b"\0" not in self._held:
@@ -117,7 +127,7 @@ class Browser:
                 raise TimeoutError(f"{method} has no answer after {self.limit:g} s")
             found = os.read(self._back.fileno(), 1 << 20)
             if not found:
-                raise OSError(f"the browser has ended:\n{self._log.read_text()[-2000:]}")
+                raise OSError(self._ended())
             self._held += found
         text, _, self._held = self._held.partition(b"\0")
         return text

@@ -228,6 +228,30 @@ def test_browser_reports_what_a_page_throws(
         page.evaluate("new Promise(() => {})")
 
 
+@needs_browser
+def test_browser_ends_a_wait_at_its_limit(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with browser.page("about:blank") as page:
+        monkeypatch.setattr(browser, "limit", 0.2)
+        with pytest.raises(TimeoutError, match=r"no answer after 0\.2 s"):
+            page.evaluate("new Promise(() => {})")
+        monkeypatch.undo()
+
+
+@needs_browser
+def test_browser_that_cannot_start_is_reported(tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    broken.write_text("#!/bin/sh\necho no display >&2\n")
+    broken.chmod(0o755)
+    with (
+        Browser(str(broken), tmp_path / "profile") as found,
+        pytest.raises(OSError, match="no display"),
+        found.page("about:blank"),
+    ):
+        pass
+
+
 def test_page_is_one_small_file_without_addresses(built: str) -> None:
     assert len(built.encode()) <= MOST
     assert "http://" not in built and "https://" not in built
