@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import onnx
+from numpy.typing import NDArray
 from onnx import numpy_helper
 
 from agents.policies import policy_file as files
@@ -218,7 +219,7 @@ def policy_model(name: str, policy: OnnxPolicy, period: float) -> Model:
     if corrects:
         given = signal_variables(actions, "input", "controller.")
         inputs += [replace(v, index=len(signals) + v.index) for v in given]
-    arrays = {
+    arrays: dict[str, NDArray[Any]] = {
         "input": np.zeros(len(inputs)),
         "output": np.zeros(len(actions), np.float32),
         "state": np.zeros(max(1, policy.memory), np.float32),

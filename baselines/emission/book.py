@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pam_envs.arrays import Array
 from pam_envs.export.model import Block, Model, identifier, signal_variables
@@ -85,7 +86,10 @@ def model_of(design: Design, name: str, signals: Signals, actions: Signals, peri
     period : float
         Control period [s].
     """
-    own = {"input": np.zeros(len(signals)), "output": np.zeros(len(actions), np.float32)}
+    own: dict[str, NDArray[Any]] = {
+        "input": np.zeros(len(signals)),
+        "output": np.zeros(len(actions), np.float32),
+    }
     own["state"] = np.zeros(max(1, design.state))
     own["data"] = np.asarray(design.numbers, np.float64)
     own["columns"] = np.asarray(design.columns, np.int64)

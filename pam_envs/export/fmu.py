@@ -233,13 +233,15 @@ def description2(model: Model) -> str:
 def _root(model: Model, version: str, **identity: str) -> ElementTree.Element:
     return ElementTree.Element(
         "fmiModelDescription",
-        fmiVersion=version,
-        modelName=model.name,
-        **identity,
-        description=model.title,
-        version=model.digest[:16],
-        generationTool="pam-envs",
-        variableNamingConvention="structured",
+        {
+            "fmiVersion": version,
+            "modelName": model.name,
+            **identity,
+            "description": model.title,
+            "version": model.digest[:16],
+            "generationTool": "pam-envs",
+            "variableNamingConvention": "structured",
+        },
     )
 
 
