@@ -86,8 +86,10 @@ def model_of(design: Design, name: str, signals: Signals, actions: Signals, peri
     period : float
         Control period [s].
     """
-    own: dict[str, NDArray[Any]] = {"input": np.zeros(len(signals))}
-    own["output"] = np.zeros(len(actions), np.float32)
+    own: dict[str, NDArray[Any]] = {
+        "input": np.zeros(len(signals)),
+        "output": np.zeros(len(actions), np.float32),
+    }
     own["state"] = np.zeros(max(1, design.state))
     own["data"] = np.asarray(design.numbers, np.float64)
     own["columns"] = np.asarray(design.columns, np.int64)

@@ -1,5 +1,6 @@
 """Knee controllers as kernels: PI of the tension, feedforward, and feedback by LTR."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -305,7 +306,7 @@ def knee_ltr(controller: KneeLtr) -> Design:
 def _design(
     observer: KneeObserver, action: Any, kind: str, forward: Forward | None = None, *,
     within: SetPointLimits | None = None, gains: list[float] | None = None,
-    loops: list[Bumpless] | None = None, assist: bool = True,
+    loops: Sequence[Bumpless] = (), assist: bool = True,
 ) -> Design:  # fmt: skip
     nominal, readers = observer.nominal, [observer.reader]
     plant, lever, full = nominal.plant, nominal.plant.lever, nominal.full_pressure
@@ -332,9 +333,9 @@ def _design(
         np.concatenate([_six(r, k) if j == 0 else r[k] for j, r in enumerate(readers)])
         for k in (1, 2, 0)
     )
-    systems = [_system(loop) for loop in loops or []]
-    state = [len(s.controller.b) + len(s.model.b) for s in loops or []]
-    compensated = bool(loops and loops[0].compensated)
+    systems = [_system(loop) for loop in loops]
+    state = [len(s.controller.b) + len(s.model.b) for s in loops]
+    compensated = bool(loops) and loops[0].compensated
     numbers = [
         lever.arm, lever.fittings, lever.stiffness, lever.relaxed_angle,
         plant.muscle.shortest_length,

@@ -13,7 +13,7 @@ from agents.policies.emission import policy_model
 from agents.policies.policy import OnnxPolicy
 from baselines.emission.catalogue import controller_model
 from benchmarks.playground.replay import SETTLED, nominal_controller
-from benchmarks.playground.scenes import SCENES, SWEEP, SWEEP_STEPS, Scene
+from benchmarks.playground.scenes import SCENES, SWEEP, SWEEP_STEPS, Scene, acts
 from pam_envs.export.environment import environment_model
 from pam_envs.export.model import Model
 from pam_envs.export.wasm import INSTANCE, description, link
@@ -47,16 +47,22 @@ def packed(model: Model) -> dict[str, Any]:
 
 def facts(scene: Scene) -> dict[str, Any]:
     """Return a scene as plain values for the page."""
-    plant, nominal = scene.plant(next(iter(scene.hysteresis))), scene.nominal()
+    plants = {kind: scene.plant(kind) for kind in scene.hysteresis}
+    nominal = scene.nominal()
     made = {
         key: value
         for key, value in vars(scene).items()
         if key not in ("plant", "nominal", "arguments", "sliders")
     }
     made["sliders"] = [dataclasses.asdict(slider) for slider in scene.sliders]
+    made["idle"] = {
+        kind: [slider.name for slider in scene.sliders if not acts(plant, slider)]
+        for kind, plant in plants.items()
+    }
     made["settled"] = SETTLED
     made["full"] = nominal.regulator.max_pressure
     if scene.name == "knee":
+        plant = next(iter(plants.values()))
         made["leg"] = {
             "thigh": plant.leg.thigh, "shank": plant.leg.shank, "arm": plant.lever.arm,
         }  # fmt: skip

@@ -103,16 +103,18 @@ class Scene:
                 value = slider.value(values[slider.name], plant)
                 if slider.parameter == "load":
                     given["load"] = value
-                elif slider.parameter not in plant.inert and acts(plant, slider):
+                elif acts(plant, slider):
                     drawn[slider.parameter] = (value, value)
             given["randomize"] = drawn  # fixed values, which leave the environment's own numbers
         return gym.make(self.env, plant=plant, **given).unwrapped
 
 
 def acts(plant: Any, slider: Slider) -> bool:
-    """Return whether a slider has an effect: those of the hysteresis need one."""
+    """Return whether a slider has an effect on a plant: those of the hysteresis need one."""
     of_hysteresis = slider.parameter in ("hysteresis.friction", "hysteresis.width")
-    return not (of_hysteresis and plant.hysteresis.operator is None)
+    if of_hysteresis and plant.hysteresis.operator is None:
+        return False
+    return slider.parameter not in plant.inert
 
 
 def _muscle(hysteresis: str) -> Any:

@@ -203,6 +203,7 @@ def _functions(model: Model) -> str:
     model->flags[1] = 0;
     {p}_kernel(book.words, 2);
     model->flags[0] = 0;
+    model->report[0] = 0; /* the reward: no step yet */
 }}
 
 void {p}_reset({p} *model, uint64_t seed) {{

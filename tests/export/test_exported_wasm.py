@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.exported import differing, run_wasm
+from benchmarks.exported import SEED, WasmModel, differing, run_wasm
 from pam_envs.export.wasm import export_wasm
 
 pytest.importorskip("wasmtime")
@@ -28,6 +28,16 @@ def exported(case, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_thousand_steps_in_wasm_have_the_bits_of_python(case, exported: Path) -> None:
     assert differing(run_wasm(case.model, exported, case.actions), case.reference) == 0
+
+
+def test_second_reset_gives_the_outputs_of_the_first(case, exported: Path) -> None:
+    made = WasmModel(case.model, exported)
+    made.call("reset", SEED, 0)
+    for action in case.actions[:50]:
+        made.inputs[:] = action
+        made.call("step")
+    made.call("reset", SEED, 0)
+    assert differing(made.outputs, case.reference[0]) == 0
 
 
 def test_module_is_small_and_imports_nothing(case, exported: Path) -> None:

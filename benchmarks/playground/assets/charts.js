@@ -76,7 +76,7 @@ class Chart {
     g.clip();
     for (const line of this.lines) {
       if (tail) {
-        this.path(g, line, 0, line.y.length, 0.28, 1.2);
+        this.path(g, line, 0, line.y.length, 0.45, 1.2);
         this.path(g, line, Math.max(0, row - tail), row + 1, 1, 2);
       } else this.path(g, line, 0, line.y.length, 1, line.width ?? 1.8);
     }

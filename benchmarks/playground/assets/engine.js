@@ -26,9 +26,10 @@ class Engine {
   // Return values of parameters in SI, by name; `settings` are those of the page.
   parameters(settings, env) {
     const found = {};
-    for (const slider of this.data.scenes[settings.scene].sliders) {
+    const { sliders, idle } = this.data.scenes[settings.scene];
+    for (const slider of sliders) {
+      if (idle[settings.hysteresis].includes(slider.name)) continue;
       const known = env.about.parameters.find((p) => p.name === slider.parameter);
-      if (!known) continue;
       const unit = slider.relative ? known.start : slider.factor;
       found[slider.parameter] = settings.values[slider.name] * unit;
     }

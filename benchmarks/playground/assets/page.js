@@ -24,6 +24,17 @@ function element(tag, attributes = {}, ...children) {
   return made;
 }
 
+const digits = (value) => (Number.isFinite(value) ? value.toPrecision(3) : "–");
+
+// Show why the page does not show a run.
+function fail(error) {
+  one("fault").textContent = `This run failed: ${error?.message ?? error}. Reset the settings or load the page again; ` +
+    "it needs a browser from May 2023 or later.";
+  one("fault").hidden = false;
+}
+addEventListener("error", (event) => fail(event.error ?? event.message));
+addEventListener("unhandledrejection", (event) => fail(event.reason));
+
 // --- settings -----------------------------------------------------------------------------------
 
 function showScenes() {
@@ -50,10 +61,9 @@ function showSettings() {
   options("hysteresis", about().hysteresis, hysteresis);
   options("controller", about().controllers, controller);
   one("seed").value = seed;
-  const known = DATA.modules[`${page.settings.scene}/${hysteresis}`].parameters;
   const rows = about().sliders.map((slider) => {
     const { name, label, unit, low, high, step } = slider, id = `slider-${name}`;
-    const idle = !known.some((p) => p.name === slider.parameter);
+    const idle = about().idle[hysteresis].includes(name);
     const shown = element("output", { for: id });
     const input = element("input", { id, type: "range", min: low, max: high, step });
     const write = (value) =>
@@ -76,7 +86,6 @@ function change(settings, all = false) {
   if (settings.scene !== page.settings.scene) page.row = 0;
   page.settings = settings;
   if (all) showSettings();
-  history.replaceState(null, "", fragment(settings));
   one("python").textContent = python(settings);
   page.turn += 1;
   if (!page.busy) compute();
@@ -87,14 +96,26 @@ function change(settings, all = false) {
 async function compute() {
   page.busy = true;
   let turn = -1;
-  while (turn !== page.turn) {
-    turn = page.turn;
-    const episode = await engine.run(page.settings);
-    await new Promise(requestAnimationFrame);
-    if (turn === page.turn) show(episode);
+  try {
+    while (turn !== page.turn) {
+      turn = page.turn;
+      const episode = await engine.run(page.settings);
+      await new Promise(requestAnimationFrame);
+      if (turn === page.turn) show(episode);
+    }
+  } finally {
+    page.busy = false;
   }
-  page.busy = false;
-  compare(turn);
+  await compare(turn);
+}
+
+// Put the settings into the address. Browsers refuse this in some frames, and if it is too frequent.
+function writeAddress(settings) {
+  try {
+    history.replaceState(null, "", fragment(settings));
+  } catch (error) {
+    if (error.name !== "SecurityError") throw error;
+  }
 }
 
 function show(episode) {
@@ -119,7 +140,6 @@ function show(episode) {
   one("row").max = episode.length - 1;
   page.row = Math.min(page.row, episode.length - 1);
   const { rms, most, ended } = episode.score();
-  const digits = (v) => (Number.isFinite(v) ? v.toPrecision(3) : "–");
   const travel = mean(episode.signal("effort/pressure_travel")) / (episode.period * 1e5);
   const tiles = [
     ["RMS error", digits(rms), about().unit],
@@ -133,7 +153,7 @@ function show(episode) {
       element("dd", {}, ((episode.length - 1) * episode.period).toFixed(1), " ", element("span", {}, "s"))));
   one("score").replaceChildren(...made);
   one("scene").setAttribute("aria-label", about().title);
-  document.body.dataset.shown = fragment(page.settings);
+  one("fault").hidden = true;
   draw();
 }
 
@@ -166,20 +186,22 @@ async function compare(turn) {
     scored.push([name, run.score()]);
   }
   if (turn !== page.turn) return;
-  scored.sort((a, b) => a[1].rms - b[1].rms);
-  const most = Math.max(...scored.map(([, score]) => score.rms));
+  const rank = (score) => (Number.isFinite(score.rms) ? score.rms : Infinity);
+  scored.sort((a, b) => rank(a[1]) - rank(b[1]) || 0);
+  const most = Math.max(...scored.map(([, score]) => score.rms || 0));
   one("ranks").replaceChildren(...scored.map(([name, { rms, ended }]) => {
     const button = element("button", { type: "button" }, about().controllers[name]);
     button.addEventListener("click", () => change({ ...page.settings, controller: name }, true));
     const bar = element("div");
-    bar.style.width = `${(100 * rms) / most}%`;
+    bar.style.width = `${(100 * (rms || 0)) / most}%`;
     return element("tr", { class: name === page.settings.controller ? "chosen" : "", "data-controller": name },
-      element("td", {}, button), element("td", { class: "number" }, rms.toPrecision(3) + (ended ? " *" : "")),
+      element("td", {}, button), element("td", { class: "number" }, digits(rms) + (ended ? " *" : "")),
       element("td", { class: "wide" }, bar));
   }));
-  const gate = about().gate.length ? ", in stance (not shaded)" : "";
-  one("note").textContent = `In this episode, after ${about().settled} s${gate}.` +
-    (scored.some(([, score]) => score.ended) ? " * ended early by a limit." : "");
+  const gate = about().gate.length ? ", in stance only (not shaded)" : "";
+  one("note").textContent = `Errors in this episode from ${about().settled} s on${gate}.` +
+    (scored.some(([, score]) => score.ended) ? " * Ended early by a limit." : "");
+  writeAddress(page.settings);
   document.body.dataset.compared = fragment(page.settings);
 }
 
@@ -244,7 +266,7 @@ one("row").addEventListener("input", () => {
   draw();
 });
 one("copy").addEventListener("click", () => copy("copy", python(page.settings)));
-one("link").addEventListener("click", () => copy("link", location.href));
+one("link").addEventListener("click", () => copy("link", location.href.split("#")[0] + fragment(page.settings)));
 addEventListener("hashchange", () => change(parsed(DATA, location.hash), true));
 addEventListener("resize", draw);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);

@@ -124,7 +124,7 @@ function drawLeg(canvas, episode, row) {
   const skin = ink("--skin");
   limb(g, hip, knee, 0.11 * scale, 0.075 * scale, skin);
   limb(g, knee, ankle, 0.075 * scale, 0.045 * scale, skin);
-  fill(g, [ankle, heel, toe], stance ? ink("--steel") : ink("--rule"));
+  fill(g, [ankle, heel, toe], stance ? ink("--steel") : mixed("--steel", "--paper", 0.4));
   stroke(g, [knee, along(knee, lower + off, scale * shank)], ink("--wanted"), 1.6, [5, 4]);
   const middle = 0.5 * (upper + Math.PI + lower), half = 0.5 * at("state/angle");
   const ends = [1, -1].map((way) => along(knee, middle + way * half, scale * arm));

@@ -103,7 +103,7 @@ class FlexibleBase:
         begins = [(plain.z, k, {}) for k in range(STARTS)]
         if self.guess:
             guessed = [f.inner(f.within(self.guess.get(f.name, f.start))) for f in plain.frees]
-            begins.append((np.array(guessed), 0, self.absent(causes) | self.guess))
+            begins.append((np.array(guessed), 0, {**self.absent(causes), **self.guess}))
         for begin, k, guess in begins:
             frees = tuple(
                 free

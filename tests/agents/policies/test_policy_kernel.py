@@ -20,6 +20,8 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="the kernels are compiled")
 STEPS = 1000
 LARGEST = 1e-6
 """Largest difference of an action, of a range from -1 to 1."""
+PAST = 40
+"""Steps before the compared ones that a policy with a state has seen."""
 
 
 def answers(name: str, steps: int = STEPS) -> tuple[Any, Array, Array]:
@@ -54,18 +56,18 @@ def test_thousand_actions_in_c_are_those_of_onnxruntime(name: str, tmp_path: Pat
 def test_first_step_begins_an_episode(tmp_path: Path) -> None:
     differences = []
     for name in ("residual_knee_tension", "residual_knee_stiffness", "residual_elbow"):
-        policy, inputs, actions = answers(name, 40)
+        policy, inputs, actions = answers(name, 2 * PAST)
         n = len(policy.signals)
-        late = inputs[10:].astype(np.float32)
+        late = inputs[PAST:].astype(np.float32)
         state, fresh = None, []
         for row in late:
             action, state = policy.answer(row[:n], state, None, row[n:])
             fresh.append(action)
         model = policy_model(name, policy, 0.01)
         export_c(model, tmp_path / name, [host_platform()])
-        found = run_c(model, tmp_path / name, inputs[10:])
+        found = run_c(model, tmp_path / name, inputs[PAST:])
         assert np.abs(found - np.array(fresh, float)).max() <= LARGEST
-        differences.append(np.abs(actions[10:] - np.array(fresh, float)).max())
+        differences.append(np.abs(actions[PAST:] - np.array(fresh, float)).max())
     assert max(differences) > 1e-3  # the past matters
 
 

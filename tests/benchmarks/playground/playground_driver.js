@@ -1,9 +1,6 @@
-// Runs scenes in the page, and writes their outputs into an element that the test reads.
-const seen = { faults: [], runs: {} };
-addEventListener("error", (event) => seen.faults.push(String(event.message)));
-addEventListener("unhandledrejection", (event) => seen.faults.push(String(event.reason)));
-addEventListener("securitypolicyviolation", (event) => seen.faults.push(event.violatedDirective));
-const wait = (met) => new Promise((done) => {
+// Operates the page and returns what it shows; evaluated in the page with its JOBS.
+const seen = { runs: {} };
+const until = (met) => new Promise((done) => {
   const look = () => (met() ? done() : setTimeout(look, 20));
   look();
 });
@@ -19,48 +16,30 @@ const act = (node, value, kind) => {
   node.value = value;
   node.dispatchEvent(new Event(kind));
 };
-const settled = () => wait(() => document.body.dataset.compared === fragment(page.settings));
+const settled = () => until(() => document.body.dataset.compared === fragment(page.settings));
 
-async function drive() {
-  for (const [name, settings, steps] of JOBS) {
-    const run = await engine.run(settings, steps);
-    seen.runs[name] = { outputs: bits(run.rows), rms: run.score().rms, python: python(settings) };
-  }
-  await settled();
-  seen.usual = at("score").innerText;
-  act(at("slider-load"), "4.5", "input");
-  await settled();
-  seen.heavy = { score: at("score").innerText, address: location.hash, python: at("python").textContent };
-  seen.loaded = page.episode.signal("state/load")[5];
-  act(at("hysteresis"), "none", "change");
-  await settled();
-  seen.idle = at("slider-friction").disabled;
-  document.querySelector('[data-scene="knee"]').click();
-  await settled();
-  seen.ranks = [...document.querySelectorAll("#ranks tr")].map((row) => row.dataset.controller);
-  seen.rms = [...document.querySelectorAll("#ranks .number")].map((cell) => Number(cell.textContent));
-  seen.pixels = ["scene", "loop", "tracking", "pressure"].map((id) => {
-    const canvas = at(id), data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-    return new Set(new Uint32Array(data.buffer)).size;
-  });
-  seen.parsed = fragment(parsed(DATA, seen.heavy.address));
-  seen.wrong = fragment(parsed(DATA, "#scene=nowhere&load=99&seed=-3&controller=zero"));
-  seen.loadedFiles = performance.getEntriesByType("resource").map((entry) => entry.name);
-  seen.widths = [];
-  for (const width of [390, 1280]) {
-    const frame = document.createElement("iframe");
-    frame.style.cssText = `width:${width}px;height:800px;border:0`;
-    frame.srcdoc = PAGE;
-    document.body.append(frame);
-    await wait(() => frame.contentDocument?.body?.dataset?.shown);
-    seen.widths.push([width, frame.contentDocument.documentElement.scrollWidth]);
-    frame.remove();
-  }
+for (const [name, settings, steps] of JOBS) {
+  const run = await engine.run(settings, steps);
+  seen.runs[name] = { outputs: bits(run.rows), rms: run.score().rms };
 }
-
-drive().catch((error) => seen.faults.push(String(error))).finally(() => {
-  const made = document.createElement("pre");
-  made.id = "seen";
-  made.textContent = JSON.stringify(seen);
-  document.body.append(made);
+await settled();
+seen.usual = at("score").innerText;
+act(at("slider-load"), "4.5", "input");
+await settled();
+seen.heavy = { score: at("score").innerText, address: location.hash, python: at("python").textContent };
+seen.load = page.episode.signal("state/load")[5];
+act(at("hysteresis"), "none", "change");
+await settled();
+seen.idle = at("slider-friction").disabled;
+document.querySelector('[data-scene="knee"]').click();
+await settled();
+seen.ranks = [...document.querySelectorAll("#ranks tr")].map((row) => row.dataset.controller);
+seen.rms = [...document.querySelectorAll("#ranks .number")].map((cell) => Number(cell.textContent));
+seen.pixels = ["scene", "loop", "tracking", "pressure"].map((id) => {
+  const canvas = at(id), data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  return new Set(new Uint32Array(data.buffer)).size;
 });
+seen.parsed = fragment(parsed(DATA, seen.heavy.address));
+seen.wrong = fragment(parsed(DATA, "#scene=nowhere&load=99&seed=-3&controller=zero"));
+seen.files = performance.getEntriesByType("resource").map((entry) => entry.name);
+return seen;

@@ -2,13 +2,13 @@
 
 import base64
 import json
-import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from browser import value_of
+from browser import NAMES, Browser, PageError, find
 
 from benchmarks.exported import differing
 from benchmarks.playground import page
@@ -21,10 +21,9 @@ pytestmark = [
     pytest.mark.skipif(not COMPILED, reason="the kernels are compiled"),
     pytest.mark.xdist_group("playground"),
 ]
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-BROWSER = next((path for path in map(shutil.which, BROWSERS) if path), None)
+PROGRAM = find()
 needs_browser = pytest.mark.skipif(
-    BROWSER is None, reason=f"no browser here; install one of {', '.join(BROWSERS)}"
+    PROGRAM is None, reason=f"no browser here; install one of {', '.join(NAMES)}"
 )
 DRIVER = Path(__file__).with_name("playground_driver.js")
 STEPS = 1000
@@ -48,6 +47,14 @@ POLICIES = {
     "walk_policy": ("knee", "maxwell_slip", "ppo_knee_walk", 1, KNEE),
 }
 CASES = {**EXACT, **POLICIES}
+COMPARED = """new Promise((done) => {
+  const look = () => {
+    if (document.body.dataset.compared) done(document.getElementById("score").innerText);
+    else setTimeout(look, 20);
+  };
+  look();
+})"""
+"""Scores on the page, once all controllers are compared."""
 
 
 def settings(scene: str, hysteresis: str, controller: str, seed: int, values: Any) -> Any:
@@ -67,19 +74,26 @@ def built() -> str:
 
 
 @pytest.fixture(scope="module")
-def seen(built: str, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Return what the driver saw in the browser, which has no way out of this machine."""
-    folder = tmp_path_factory.mktemp("playground")
-    jobs = [[name, settings(*case), STEPS] for name, case in CASES.items()]
-    inside = json.dumps(built).replace("</", "<\\/")
-    driver = f"const JOBS = {json.dumps(jobs)};\nconst PAGE = {inside};\n{DRIVER.read_text()}"
-    path = folder / "index.html"
-    path.write_text(built.replace("</body>", f"<script>{driver}</script></body>"))
-    text = value_of(
-        str(BROWSER), path.as_uri(), "document.getElementById('seen')?.textContent",
-        folder / "profile", 400.0,
-    )  # fmt: skip
-    return json.loads(text)
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Return a browser, which has no way out of this machine."""
+    with Browser(str(PROGRAM), tmp_path_factory.mktemp("browser") / "profile") as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def address(built: str, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Return the address of the page."""
+    path = tmp_path_factory.mktemp("playground") / "index.html"
+    path.write_text(built, encoding="utf-8")
+    return path.as_uri()
+
+
+@pytest.fixture(scope="module")
+def seen(browser: Browser, address: str) -> Any:
+    """Return what the page shows while the driver operates it."""
+    jobs = json.dumps([[name, settings(*case), STEPS] for name, case in CASES.items()])
+    with browser.page(address) as page:
+        return page.evaluate(f"(async (JOBS) => {{\n{DRIVER.read_text()}}})({jobs})")
 
 
 def outputs_of(run: Any) -> np.ndarray[Any, Any]:
@@ -87,9 +101,8 @@ def outputs_of(run: Any) -> np.ndarray[Any, Any]:
 
 
 @needs_browser
-def test_nothing_fails_and_nothing_is_loaded_from_elsewhere(seen: Any) -> None:
-    assert seen["faults"] == []
-    assert seen["loadedFiles"] == []
+def test_page_loads_no_further_file(seen: Any) -> None:
+    assert seen["files"] == []
 
 
 @needs_browser
@@ -128,7 +141,7 @@ def test_program_on_the_page_computes_the_same_run(
 
 @needs_browser
 def test_sliders_change_the_run_and_the_link(seen: Any) -> None:
-    assert seen["loaded"] == 4.5
+    assert seen["load"] == 4.5
     assert seen["heavy"]["score"] != seen["usual"]
     assert "load=4.5" in seen["heavy"]["address"]
     assert seen["parsed"] == seen["heavy"]["address"]
@@ -152,8 +165,91 @@ def test_controllers_are_ranked_and_charts_are_drawn(seen: Any) -> None:
 
 
 @needs_browser
-def test_page_is_as_wide_as_a_phone(seen: Any) -> None:
-    assert [tuple(pair) for pair in seen["widths"]] == [(390, 390), (1280, 1280)]
+@pytest.mark.parametrize("width", [320, 390, 768, 1280])
+def test_page_fits_the_width_of_the_screen(browser: Browser, address: str, width: int) -> None:
+    with browser.page(address) as page:
+        page.resize(width, 800)
+        page.evaluate(COMPARED)
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
+@needs_browser
+def test_page_works_in_a_frame_without_an_address(browser: Browser, built: str) -> None:
+    with browser.page("about:blank") as page:
+        page.evaluate(f"""
+          globalThis.frame = Object.assign(document.createElement("iframe"), {{
+            srcdoc: {json.dumps(built)}
+          }});
+          new Promise((done) => {{
+            frame.onload = done;
+            document.body.append(frame);
+          }})""")
+        score = page.evaluate(COMPARED.replace("document", "frame.contentDocument"))
+        assert "RMS error" in score
+
+
+@needs_browser
+def test_failure_of_the_simulation_is_shown_and_ends_with_valid_settings(
+    browser: Browser, address: str
+) -> None:
+    with browser.page(address) as page:
+        page.evaluate(COMPARED)
+        with pytest.raises(PageError, match="no such module"):
+            page.evaluate("""
+              globalThis.usualInstance = engine.instance;
+              engine.instance = () => { throw new RangeError("no such module"); };
+              change({ ...page.settings, seed: 2 });
+              new Promise(() => {})""")
+        assert "no such module" in page.evaluate("one('fault').innerText")
+        page.evaluate("engine.instance = usualInstance; change({ ...page.settings, seed: 3 })")
+        page.evaluate(COMPARED)
+        assert page.evaluate("one('fault').hidden") is True
+
+
+@needs_browser
+@pytest.mark.parametrize(
+    ("script", "message"),
+    [
+        ("undefinedName()", "undefinedName is not defined"),
+        ("Promise.reject(new Error('late'))", "late"),
+        ("eval('1')", "Content Security Policy"),
+    ],
+)
+def test_browser_reports_what_a_page_throws(
+    browser: Browser, tmp_path: Path, script: str, message: str
+) -> None:
+    policy = "default-src 'none'; script-src 'unsafe-inline'"
+    path = tmp_path / "page.html"
+    path.write_text(
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        f"<script>setTimeout(() => {{ {script} }}, 50)</script>"
+    )
+    with pytest.raises(PageError, match=message), browser.page(path.as_uri()) as page:
+        page.evaluate("new Promise(() => {})")
+
+
+@needs_browser
+def test_browser_ends_a_wait_at_its_limit(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with browser.page("about:blank") as page:
+        monkeypatch.setattr(browser, "limit", 0.2)
+        with pytest.raises(TimeoutError, match=r"no answer after 0\.2 s"):
+            page.evaluate("new Promise(() => {})")
+        monkeypatch.undo()
+
+
+@needs_browser
+def test_browser_that_cannot_start_is_reported(tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    broken.write_text("#!/bin/sh\necho no display >&2\n")
+    broken.chmod(0o755)
+    with (
+        Browser(str(broken), tmp_path / "profile") as found,
+        pytest.raises(OSError, match="no display"),
+        found.page("about:blank"),
+    ):
+        pass
 
 
 def test_page_is_one_small_file_without_addresses(built: str) -> None:

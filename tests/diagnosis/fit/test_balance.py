@@ -1,0 +1,115 @@
+"""Regression of the force balance."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pam_envs.arrays import Array
+from pam_envs.diagnosis.fit.balance import Balance
+from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, inputs_of, start_plant
+from pam_envs.muscle.effects import MAP_TERMS
+from tests.diagnosis.conftest import needs_kernels, recorded
+from tests.diagnosis.hidden import Campaign
+
+NOISE = 5e-5
+
+pytestmark = needs_kernels
+
+
+@pytest.fixture(scope="module")
+def family(short: Campaign, tmp_path_factory: pytest.TempPathFactory) -> MuscleFamily:
+    folder: Path = tmp_path_factory.mktemp("recording")
+    recording, rig = recorded(folder, "creep", 0.0, short)
+    return MuscleFamily(start_plant(rig), inputs_of(recording, rig), 0.04)
+
+
+def balance(family: MuscleFamily, **values: float) -> Balance:
+    """Return the balance of readings of the plant with some values, without noise."""
+    column = family.column.copy()
+    for name, value in values.items():
+        column[family.free(name.replace("__", ".")).place] = value
+    columns = column[None]
+    family.tie(columns)
+    contraction, pressure = family.simulate(columns)[:, :, 0]
+    found = Balance.of(family, contraction, pressure, NOISE)
+    assert found is not None
+    return found
+
+
+def order_two(x: Array) -> Array:
+    """Return the Chebyshev polynomial of order two."""
+    return np.asarray(2.0 * np.clip(x, -1.0, 1.0) ** 2 - 1.0)
+
+
+def force(family: MuscleFamily, found: dict[str, float], pressure: Array, strain: Array) -> Array:
+    """Return the force of a static law and its map with found coefficients [N]."""
+    law = family.plant.muscle
+    area = found["muscle.area"]
+    taper = found["muscle.area_taper"] * strain + found["muscle.area_curve"] * strain**2
+    passive = found["muscle.braid_force"] * -np.expm1(-strain / law.braid_strain)
+    names = ("stiffness", "softening", "hardening", "stiffening")
+    passive += sum(found[f"muscle.{name}"] * strain ** (k + 1) for k, name in enumerate(names))
+    terms = np.zeros((6, 6))
+    for i, j in MAP_TERMS:
+        terms[i, j] = found[f"muscle.map_{i}{j}"]
+    u = np.clip(2.0 * pressure / law.map_pressure - 1.0, -1.0, 1.0)
+    s = np.clip(2.0 * strain / law.map_strain - 1.0, -1.0, 1.0)
+    mapped = np.polynomial.chebyshev.chebval2d(u, s, terms)
+    return np.asarray(area * pressure * (1.0 - taper) - passive + mapped)
+
+
+def test_it_finds_the_static_law(family: MuscleFamily) -> None:
+    larger = 1.2 * family.plant.muscle.area
+    found = balance(family, muscle__area=larger).solve()
+    assert found["muscle.area"] == pytest.approx(larger, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("values", "kind"),
+    [
+        ({"hysteresis__yield_width": 3e4, "hysteresis__yield_break": 3e4}, "hysteresis.yield_"),
+        ({"muscle__yield_force": 8.0, "muscle__yield_break": 0.03}, "muscle.yield_"),
+        (
+            {"muscle__strand_1": 4.0, "muscle__strand_3": 4.0, "muscle__strand_break": 0.03},
+            "muscle.strand_",
+        ),
+    ],
+)
+def test_it_finds_friction_of_each_kind(
+    family: MuscleFamily, values: dict[str, float], kind: str
+) -> None:
+    found = balance(family, **values).flexible()
+    sizes = {
+        "hysteresis.yield_": found.get("hysteresis.yield_width", 0.0) * found["muscle.area"],
+        "muscle.yield_": found.get("muscle.yield_force", 0.0),
+        "muscle.strand_": sum(found.get(f"muscle.strand_{k}", 0.0) for k in (1, 2, 3, 4)),
+    }
+    assert max(sizes, key=lambda name: sizes[name]) == kind
+    named = {name.replace("__", "."): value for name, value in values.items()}
+    true = {
+        "hysteresis.yield_": named.get("hysteresis.yield_width", 0.0) * found["muscle.area"],
+        "muscle.yield_": named.get("muscle.yield_force", 0.0),
+        "muscle.strand_": named.get("muscle.strand_1", 0.0) + named.get("muscle.strand_3", 0.0),
+    }
+    assert sizes[kind] == pytest.approx(true[kind], rel=0.4)
+
+
+def test_the_map_is_found_where_the_law_has_another_shape(family: MuscleFamily) -> None:
+    size = 8.0
+    changed = balance(family, muscle__map_22=size)
+    inflated = changed.pressure > 1e5  # a muscle without pressure hangs on its stop
+    p, e = changed.pressure[inflated], changed.strain[inflated]
+    found = force(family, changed.flexible(), p, e)
+    found -= force(family, balance(family).flexible(), p, e)
+    law = family.plant.muscle
+    true = size * order_two(2.0 * p / law.map_pressure - 1.0)
+    true *= order_two(2.0 * e / law.map_strain - 1.0)
+    assert np.std(true) > 1.0
+    assert np.std(found - true) < 0.4 * np.std(true)
+
+
+def test_too_few_slow_samples_give_no_balance(family: MuscleFamily) -> None:
+    few = np.full(len(family.inputs.load), np.nan)
+    few[:100] = 0.0
+    assert Balance.of(family, few, np.zeros(len(few)), NOISE) is None
