@@ -35,6 +35,8 @@ MOST_STARTS = 6
 ROUNDS = 30
 CLEAR = 1.0
 """Gain of a difference from which it is needed without a further look."""
+OBVIOUS = 0.4
+"""Gain of a difference by a linear model above which it is kept without a refit."""
 NOISE_ONLY = 1.06
 """Mean square of the residual over the noise below which the base needs no difference."""
 STARTS = 2
@@ -138,17 +140,48 @@ class FlexibleBase:
         It names those with a clear gain; the parameters of the others remain, as a calibration.
         """
         data = (self.problem, self.blocks, self.base)
+        kept_for_sure: set[str] = set()  # the fewer others remain, the more they are needed
         while any(cause.common for cause, _ in model.causes):
-            smaller = without_each_cause(*data, model, True, CLEAR)
+            expected = self.expected(model)
+            kept_for_sure |= {name for name, gain in expected.items() if gain > OBVIOUS}
+            smaller = without_each_cause(*data, model, set(expected) - kept_for_sure, CLEAR)
             losses = {name: self.loss(less, model) for name, less in smaller.items()}
-            least = min(losses, key=lambda name: losses[name])
-            if losses[least] > 0.0:
+            kept_for_sure |= {name for name, loss in losses.items() if loss > CLEAR}
+            least = min(losses, key=lambda name: losses[name], default="")
+            if losses.get(least, np.inf) > 0.0:
                 gains = {n: self.blocks.gain(c.errors, model.errors) for n, c in smaller.items()}
                 unnamed = {n for n, gain in gains.items() if gain < self.rule.common_gain}
                 kept = tuple((c, f) for c, f in model.causes if c.name not in unnamed)
                 return replace(model, causes=kept)
             model = smaller[least]
         return model
+
+    def expected(self, model: Candidate) -> dict[str, float]:
+        """Return the gain lost without each common difference, by a linear model of the residual.
+
+        Refits lose more, since bounds stop them. It is 0 where the difference has no neutral value
+        in the coordinates of the fit.
+        """
+        complete_jacobian(self.problem, model.fit)
+        normal, _ = lsq.normal_equations(self.problem, model.fit)
+        spread = np.linalg.pinv(normal, hermitian=True)
+        fit, neutral, found = model.fit, self.family.column, {}
+        names = [f.name for f in fit.frees]
+        for cause, form in model.causes:
+            places = [names.index(t.name) for t in form.terms if t.amount and t.name in names]
+            if not cause.common or not places:
+                continue
+            frees = [fit.frees[k] for k in places]
+            off = np.array([neutral[f.place] for f in frees])
+            if not all(np.isfinite(off)) or any(
+                f.log and v <= 0.0 for f, v in zip(frees, off, strict=True)
+            ):
+                found[cause.name] = 0.0
+                continue
+            moved = [f.inner(float(v)) for f, v in zip(frees, off, strict=True)] - fit.z[places]
+            more = float(moved @ np.linalg.pinv(spread[np.ix_(places, places)]) @ moved)
+            found[cause.name] = float(np.log1p(more / max(fit.cost, 1e-12)))
+        return found
 
     def loss(self, smaller: Candidate, model: Candidate) -> float:
         """Return the gain lost without a cause beyond that which the rule asks of it.

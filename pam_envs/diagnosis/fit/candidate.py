@@ -1,6 +1,6 @@
 """Models that extend the base by causes: starting points, refits and ablations."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -159,18 +159,18 @@ def without_each_cause(
     blocks: Blocks,
     base: Candidate,
     model: Candidate,
-    common_only: bool = False,
+    only: Collection[str] | None = None,
     clear: float = np.inf,
 ) -> dict[str, Candidate]:
     """Return the model refitted without each cause that the base lacks, the better of two starts.
 
-    ``common_only`` leaves out the causes in which rigs do not commonly differ. A refit that still
-    loses a gain of ``clear`` after a few rounds is not polished.
+    ``only`` are the names of the causes to leave out (default: each). A refit that still loses a
+    gain of ``clear`` after a few rounds is not polished.
     """
     fits, labels = [], []
     complete_jacobian(problem, model.fit)
     for removed, form in model.causes:
-        if removed.name in base.names or (common_only and not removed.common):
+        if removed.name in base.names or (only is not None and removed.name not in only):
             continue
         dropped = {t.name for t in form.terms}
         kept = [k for k, f in enumerate(model.fit.frees) if f.name not in dropped]
