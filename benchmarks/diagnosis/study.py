@@ -22,7 +22,7 @@ STAGES = ("verdict", "loop", "next", "oracle")
 """Diagnosis; controllers on the hidden rig; execution of the proposed experiment; diagnosis with
 the hidden causes and the common ones alone."""
 COMMON = tuple(cause.name for cause in catalogue() if cause.common)
-"""Causes of the flexible base."""
+"""Causes of the flexible base, which the oracle keeps."""
 OUTPUTS = ("contraction", "pressure")
 MOST_RIVALS = 6
 

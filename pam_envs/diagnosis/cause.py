@@ -75,6 +75,7 @@ class Cause:
     # whether rigs commonly differ in it from the base plant: it is part of the flexible base, and
     # other causes are judged by what is left
     common: bool = False
+    modest: bool = True  # whether a common difference is named already at a small gain
     once: bool = False  # it happens once, so that held-out kinds of segment need not show it
     sensor: str = ""  # sensor that would measure it directly
     contains: tuple[

@@ -150,7 +150,9 @@ class FlexibleBase:
             least = min(losses, key=lambda name: losses[name], default="")
             if losses.get(least, np.inf) > 0.0:
                 gains = {n: self.blocks.gain(c.errors, model.errors) for n, c in smaller.items()}
-                unnamed = {n for n, gain in gains.items() if gain < self.rule.common_gain}
+                small = {True: self.rule.common_gain, False: self.rule.common_clear}
+                modest = {cause.name: cause.modest for cause, _ in model.causes}
+                unnamed = {n for n, gain in gains.items() if gain < small[modest[n]]}
                 kept = tuple((c, f) for c, f in model.causes if c.name not in unnamed)
                 return replace(model, causes=kept)
             model = smaller[least]

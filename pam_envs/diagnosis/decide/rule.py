@@ -14,7 +14,7 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "4"  # part of every report
+    version: str = "5"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     trial_penalty: float = (
@@ -25,7 +25,11 @@ class Rule:
     flexible: float = 0.15
     peak: float = 30.0
     excess: float = 1.6
-    explained: float = 0.6  # removed share of the excess below which structure is unexplained
+    # removed share of the excess below which structure is unexplained; with a spectral peak of which
+    # this share of the height remains, whatever oscillates is not named yet
+    explained: float = 0.5
+    lasting: float = 0.5
+    explained_with_peak: float = 0.9
     # a rival within this share of the best gain, or this far below it, is not excluded, unless the
     # difference is significant at the level of doubt (one-sided, block bootstrap)
     close: float = 0.8
@@ -35,6 +39,7 @@ class Rule:
     # gain of a common difference from the base (another law, another drive of the friction) above
     # which it is named; a smaller one is a calibration
     common_gain: float = 0.3
+    common_clear: float = 0.75  # the same for differences that are causes in their own right
     # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
     # this share of the gain of a model that leaves only noise: otherwise it corrects the first form
     second_gain: float = 0.1
@@ -77,8 +82,13 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
             break
         level += 1
     found = levels[level]
-    if has_structure(found["left"], rule) and explained_fraction(levels[0], found) < rule.explained:
-        return Judgement("unexplained", level)
+    if has_structure(found["left"], rule):
+        height = max(rule.peak, rule.lasting * levels[0]["left"]["peak"])
+        lasts = found["left"]["peak"] > height
+        if explained_fraction(levels[0], found) < (
+            rule.explained_with_peak if lasts else rule.explained
+        ):
+            return Judgement("unexplained", level)
     still = not_excluded(found["rivals"], rule)
     return Judgement("ambiguous" if still else "named", level, still)
 

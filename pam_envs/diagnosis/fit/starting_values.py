@@ -26,8 +26,8 @@ def step_starts(
 ) -> Starts:
     """Return sizes [m], [Pa] and times [s] of steps of an output, best explanation first.
 
-    A step at each sample is projected on the complement of the base's Jacobian; cumulative sums
-    give all samples in one pass.
+    A step at each sample is projected on the complement of the base's Jacobian and of the shapes
+    that any reading may contain; cumulative sums give all samples in one pass.
     """
     samples = problem.measured.shape[1]
     good = problem.train & np.isfinite(problem.measured[output])
@@ -41,6 +41,12 @@ def step_starts(
     counts = np.cumsum(good[::-1])[::-1].astype(float)
     along = np.cumsum(moved[:, ::-1], axis=1)[:, ::-1]
     norm = counts - np.einsum("it,ij,jt->t", along, inverse, along)
+    if len(problem.shapes):
+        # orthogonal to the Jacobian, since residuals are without them
+        shapes = np.where(good, problem.shapes, 0.0)
+        after = np.cumsum(shapes[:, ::-1], axis=1)[:, ::-1]
+        inner = np.linalg.pinv(shapes @ shapes.T, rcond=1e-9)
+        norm -= np.einsum("it,ij,jt->t", after, inner, after)
     edge = max(1, round(EARLIEST * samples))
     score = np.where(norm > 1.0, tails**2 / np.maximum(norm, 1.0), 0.0)
     score[:edge] = score[samples - edge :] = 0.0

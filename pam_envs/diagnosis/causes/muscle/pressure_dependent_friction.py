@@ -35,4 +35,6 @@ CAUSE = Cause(
     needs=("contraction",),
     sensor="a load cell between muscle and load",
     compensable=True,
+    common=True,
+    modest=False,
 )
