@@ -25,8 +25,8 @@ class Rule:
     flexible: float = 0.15
     peak: float = 30.0
     excess: float = 1.6
-    # removed share of the excess below which structure is unexplained; with a spectral peak of which
-    # this share of the height remains, whatever oscillates is not named yet
+    # removed share of the excess below which structure is unexplained; where this share of a
+    # spectral peak remains, what oscillates has no name yet, and the share must be larger
     explained: float = 0.5
     lasting: float = 0.5
     explained_with_peak: float = 0.9

@@ -81,6 +81,21 @@ def test_few_blocks_require_a_larger_gain(blocks, verdict):
     assert judge(found, RULE).verdict == verdict
 
 
+@pytest.mark.parametrize(
+    ("peak", "excess", "verdict"),
+    [
+        (120.0, 4.0, "unexplained"),  # the oscillation is still there
+        (50.0, 4.0, "named"),  # most of it has gone
+        (120.0, 1.5, "named"),  # little besides
+    ],
+)
+def test_an_oscillation_that_lasts_is_unexplained(peak, excess, verdict):
+    found = evidence(
+        level(1.0, LEAK, left=left(excess=excess, peak=peak)), before=left(excess=10.0, peak=120.0)
+    )
+    assert judge(found, RULE).verdict == verdict
+
+
 @pytest.mark.parametrize(("after", "verdict"), [(2.0, "named"), (6.0, "unexplained")])
 def test_remaining_structure_decides_between_named_and_unexplained(after, verdict):
     found = evidence(level(1.0, LEAK, left=left(excess=after)), before=left(excess=10.0))
