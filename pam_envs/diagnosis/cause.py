@@ -75,7 +75,10 @@ class Cause:
     # whether rigs commonly differ in it from the base plant: it is part of the flexible base, and
     # other causes are judged by what is left
     common: bool = False
-    modest: bool = True  # whether a common difference is named already at a small gain
+    by_nature: bool = False  # whether such a difference is no fault, and named at a small gain
+    # whether it changes the static law or the width of the hysteresis, as another muscle would: on
+    # a rig that differs from the base in these, it is named only at a large gain
+    lawlike: bool = False
     once: bool = False  # it happens once, so that held-out kinds of segment need not show it
     sensor: str = ""  # sensor that would measure it directly
     contains: tuple[

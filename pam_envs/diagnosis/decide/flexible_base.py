@@ -150,13 +150,20 @@ class FlexibleBase:
             least = min(losses, key=lambda name: losses[name], default="")
             if losses.get(least, np.inf) > 0.0:
                 gains = {n: self.blocks.gain(c.errors, model.errors) for n, c in smaller.items()}
-                small = {True: self.rule.common_gain, False: self.rule.common_clear}
-                modest = {cause.name: cause.modest for cause, _ in model.causes}
-                unnamed = {n for n, gain in gains.items() if gain < small[modest[n]]}
-                kept = tuple((c, f) for c, f in model.causes if c.name not in unnamed)
+                kept = tuple(
+                    (c, f)
+                    for c, f in model.causes
+                    if gains.get(c.name, np.inf) >= self.least_gain_of(c, model)
+                )
                 return replace(model, causes=kept)
             model = smaller[least]
         return model
+
+    def least_gain_of(self, cause: Cause, model: Candidate) -> float:
+        """Return the gain from which a common difference of a model is named."""
+        others = [c for c, _ in model.causes if c.name != cause.name]
+        apart = cause.by_nature or not any(c.lawlike for c in others)
+        return self.rule.common_gain if apart else self.rule.lawlike_gain
 
     def expected(self, model: Candidate) -> dict[str, float]:
         """Return the gain lost without each common difference, by a linear model of the residual.

@@ -39,7 +39,8 @@ class Rule:
     # gain of a common difference from the base (another law, another drive of the friction) above
     # which it is named; a smaller one is a calibration
     common_gain: float = 0.3
-    common_clear: float = 0.75  # the same for differences that are causes in their own right
+    # gain of a cause that is like another law, on a rig whose law or friction differs from the base
+    lawlike_gain: float = 1.0
     # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
     # this share of the gain of a model that leaves only noise: otherwise it corrects the first form
     second_gain: float = 0.1
@@ -108,7 +109,8 @@ def required_gain(first: float, possible: float, rule: Rule) -> float:
 
 def is_accepted(level: Mapping[str, Any], required: float, rule: Rule) -> bool:
     """Return whether a further cause has the required gain, and a significant one."""
-    return bool(level["added"] >= required and level["unsure"] <= rule.doubt)
+    least = max(required, rule.lawlike_gain) if level.get("lawlike", False) else required
+    return bool(level["added"] >= least and level["unsure"] <= rule.doubt)
 
 
 def explained_fraction(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:

@@ -161,13 +161,26 @@ class Ladder:
         rivals = self.named_first(compare.prefer_simpler(self.blocks, self.base, rivals, self.rule))
         return rivals[0], rivals
 
+    def differs(self) -> bool:
+        """Return whether law or friction of the rig differ from those of a plain plant."""
+        known = {free.name for free in self.base.fit.frees}
+        return any(cause.lawlike for cause, _ in self.base.causes) or any(
+            term.name in known
+            for cause in self.causes
+            if cause.common and cause.lawlike
+            for form in cause.forms
+            for term in form.terms
+            if term.amount
+        )
+
     def evidence(self, levels: Sequence[Level]) -> dict[str, Any]:
         """Return the input of the rule, in plain types.
 
         ``blocks`` is the number of held-out blocks. ``levels`` has one entry for each number of
         causes from none: ``gain`` over the base, ``added`` over the level before, the ``possible``
         gain if only noise were left, the p-value (``unsure``), the remaining structure (``left``)
-        and the ``rivals``, best first, each with ``names``, ``forms``, ``gain``, ``better`` (share
+        whether the added cause is like another law on a rig with another law (``lawlike``), and the
+        ``rivals``, best first, each with ``names``, ``forms``, ``gain``, ``better`` (share
         of bootstrap samples in which it beats the best), ``imitates`` (it contains the best as a
         limit) and ``out`` (excluded before the cross-validation).
         """
@@ -175,6 +188,8 @@ class Ladder:
         made = []
         for k, level in enumerate(levels):
             before = levels[max(k - 1, 0)].model
+            further = [c for c, _ in level.model.causes if c.name not in before.names]
+            lawlike = bool(further) and self.differs() and all(c.lawlike for c in further)
             made.append(
                 {
                     "gain": self.gain(level.model),
@@ -184,6 +199,7 @@ class Ladder:
                         self.problem, self.blocks, before, level.model, len(level.rivals)
                     ),
                     "left": level.left,
+                    "lawlike": lawlike,
                     "rivals": [
                         self.row(self.blocks, self.base, rival, level.model, draws)
                         for rival in level.rivals[:KEPT]

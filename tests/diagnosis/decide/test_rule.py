@@ -82,6 +82,15 @@ def test_few_blocks_require_a_larger_gain(blocks, verdict):
 
 
 @pytest.mark.parametrize(
+    ("gain", "lawlike", "verdict"),
+    [(0.5, True, "adequate"), (0.5, False, "named"), (1.2, True, "named")],
+)
+def test_a_cause_like_another_law_needs_more_on_a_rig_with_another_law(gain, lawlike, verdict):
+    found = evidence(level(gain, LEAK) | {"lawlike": lawlike})
+    assert judge(found, RULE).verdict == verdict
+
+
+@pytest.mark.parametrize(
     ("peak", "excess", "verdict"),
     [
         (120.0, 4.0, "unexplained"),  # the oscillation is still there

@@ -55,4 +55,6 @@ CAUSE = Cause(
     sensor="a load cell at a blocked length",
     compensable=True,
     common=True,
+    by_nature=True,
+    lawlike=True,
 )

@@ -39,4 +39,6 @@ CAUSE = Cause(
     sensor="a load cell at a blocked length, for the part that is not driven by length",
     compensable=True,
     common=True,
+    by_nature=True,
+    lawlike=True,
 )

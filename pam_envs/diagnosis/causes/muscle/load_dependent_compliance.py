@@ -44,4 +44,5 @@ CAUSE = Cause(
     needs=("contraction", "loads"),
     sensor="a load cell between muscle and load",
     compensable=True,
+    lawlike=True,
 )

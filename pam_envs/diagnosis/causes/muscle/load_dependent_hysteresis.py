@@ -21,4 +21,5 @@ CAUSE = Cause(
     needs=("contraction", "loads"),
     sensor="a load cell between muscle and load",
     compensable=True,
+    lawlike=True,
 )

@@ -36,5 +36,5 @@ CAUSE = Cause(
     sensor="a load cell between muscle and load",
     compensable=True,
     common=True,
-    modest=False,
+    lawlike=True,
 )

@@ -36,4 +36,6 @@ CAUSE = Cause(
     sensor="a load cell at blocked lengths",
     compensable=True,
     common=True,
+    by_nature=True,
+    lawlike=True,
 )

@@ -24,4 +24,5 @@ CAUSE = Cause(
     needs=("contraction",),
     sensor="a load cell at a blocked length, at low pressure",
     compensable=True,
+    lawlike=True,
 )

@@ -39,4 +39,5 @@ CAUSE = Cause(
     sensor="a fast pressure sensor at the muscle",
     compensable=True,
     common=True,
+    by_nature=True,
 )

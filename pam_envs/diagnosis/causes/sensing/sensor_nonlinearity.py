@@ -25,4 +25,5 @@ CAUSE = Cause(
     settled="the static law absorbs it exactly",
     sensor="a second sensor of another kind, or gauge blocks",
     # not compensable: the recording is read through the same sensor
+    lawlike=True,
 )
