@@ -18,7 +18,7 @@ _compile = os.environ.get("PAM_ENVS_COMPILE")
 os.environ["PAM_ENVS_COMPILE"] = "0"
 from docutils.parsers.rst import Directive  # noqa: E402
 
-import pam_envs.kernels.build  # noqa: E402, F401
+import pam_envs.kernels.build  # noqa: E402
 
 del os.environ["PAM_ENVS_COMPILE"]
 if _compile is not None:
