@@ -60,7 +60,14 @@ if not API:
     extensions.remove("sphinx.ext.autosummary")
     extensions.remove("sphinx.ext.viewcode")
 
+REPOSITORY = ""  # address of the public repository, once there is one: links to the sources
 html_theme = "furo"
+if REPOSITORY:
+    html_theme_options = {
+        "source_repository": REPOSITORY,
+        "source_branch": "main",
+        "source_directory": "",
+    }
 html_title = "pam-envs"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]

@@ -8,7 +8,13 @@ import pytest
 ROOT = Path(__file__).parents[1]
 SNIPPET = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#\s]+)")
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "SUPPORT.md",
+    ROOT / "RELEASING.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 
 
 def run_snippets(page: Path) -> dict[str, object]:
@@ -26,6 +32,12 @@ def test_snippets_of_the_readme_run(tmp_path, monkeypatch):
     names = run_snippets(ROOT / "README.md")
     assert names["rms"] < 0.5e-3  # m; what the page says of its controller
     assert (tmp_path / "slow.yaml").exists()
+
+
+def test_snippets_of_the_start_page_run(capsys):
+    names = run_snippets(ROOT / "docs/start.md")
+    assert "mm, reference" in capsys.readouterr().out
+    assert abs(names["info"]["output"] - names["info"]["reference"]) < 1e-3  # m, after 10 s
 
 
 def test_snippets_of_the_orthosis_print_the_stated_output(capsys):
