@@ -82,6 +82,7 @@ nb_execution_cache_path = str(ROOT / "build/docs-cache")
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
+nb_output_stderr = "remove"  # notes of the compiler
 
 suppress_warnings = ["ref.python"]  # a type of a docstring that several modules define
 autosummary_generate = True
