@@ -80,7 +80,7 @@ docs: build/docs-extra/board build/docs-extra/playground ## Build the documentat
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --doctree-dir build/docs-doctrees --conf-dir docs . build/docs
 
 docs-check: docs ## Look for broken links and errors of the built site in a browser
-	$(BIN)/python -m tests.docs.site build/docs
+	$(BIN)/python -m tests.docs.site_checks build/docs
 
 wheel: $(READY) ## Build the wheel with compiled code of the default configurations
 	$(BIN)/python -m pam_envs.export.shipping

@@ -147,8 +147,16 @@ def only_pages(_app, config) -> None:
     config.source_suffix.pop(".ipynb", None)
 
 
+def folded(_app, _page, _template, context, _doctree) -> None:
+    """Show the branch of the present page alone: unfolded, the API reference has 400 entries."""
+    if "toctree" in context:
+        whole = context["toctree"]
+        context["toctree"] = lambda **options: whole(**{**options, "collapse": True})
+
+
 def setup(app) -> None:
-    """Connect :func:`plain_markup` before napoleon, :func:`only_pages` after myst-nb."""
+    """Connect the above, in their order relative to napoleon, myst-nb and furo."""
+    app.connect("html-page-context", folded, priority=100)
     app.connect("autodoc-process-docstring", plain_markup, priority=400)
     app.connect("config-inited", only_pages, priority=900)
     if not API:

@@ -1,4 +1,4 @@
-"""Checks of the built documentation site: ``python -m tests.docs.site build/docs``.
+"""Checks of the built documentation site: ``python -m tests.docs.site_checks build/docs``.
 
 Links and files without a browser; errors, loading from the network and sideways scrolling with one.
 """

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.browser import NAMES, find
-from tests.docs.site import broken_links, faults_in_browser, pages
+from tests.docs.site_checks import broken_links, faults_in_browser, pages
 
 pytest.importorskip("furo")
 pytest.importorskip("myst_nb")
