@@ -21,6 +21,7 @@ from docutils.parsers.rst import Directive  # noqa: E402
 import pam_envs.kernels.build  # noqa: E402
 
 del os.environ["PAM_ENVS_COMPILE"]
+os.environ.pop("MPLBACKEND", None)  # notebooks draw inline
 if _compile is not None:
     os.environ["PAM_ENVS_COMPILE"] = _compile
 
@@ -33,7 +34,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
-    "sphinx.ext.viewcode",
 ]
 root_doc = "docs/index"
 templates_path = ["_templates"]
@@ -58,7 +58,6 @@ API = os.environ.get("PAM_ENVS_DOCS_API") != "off"  # off: a build in seconds, f
 if not API:
     exclude_patterns.append("docs/api/generated")
     extensions.remove("sphinx.ext.autosummary")
-    extensions.remove("sphinx.ext.viewcode")
 
 REPOSITORY = ""  # address of the public repository, once there is one: links to the sources
 html_theme = "furo"
@@ -82,6 +81,7 @@ nb_execution_cache_path = str(ROOT / "build/docs-cache")
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
+nb_render_markdown_format = "myst"  # tables
 nb_output_stderr = "remove"  # notes of the compiler
 
 suppress_warnings = ["ref.python"]  # a type of a docstring that several modules define
