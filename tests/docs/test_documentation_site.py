@@ -57,10 +57,11 @@ def test_pages_have_no_console_error_and_fit_a_phone(site):
 @pytest.mark.skipif(PROGRAM is None, reason=f"no browser here; install one of {', '.join(NAMES)}")
 def test_faults_of_a_page_are_found(tmp_path):
     wide, broken = tmp_path / "wide.html", tmp_path / "broken.html"
-    wide.write_text('<article><div style="width: 900px">x</div></article><meta name="viewport">')
+    phone = '<meta name="viewport" content="width=device-width">'
+    wide.write_text(f'{phone}<article><div style="width: 900px">x</div></article>')
     broken.write_text('<a href="none.html">x</a><script>console.error("amiss")</script>')
     found = list(faults_in_browser([wide, broken], PROGRAM))
-    assert ["900 pixels wide" in found[0], "amiss" in found[1]] == [True, True]
+    assert ["pixels wide instead of 390" in found[0], "amiss" in found[1]] == [True, True]
     assert list(broken_links(tmp_path)) == [
         "broken.html links to none.html, which does not exist",
     ]
