@@ -16,10 +16,10 @@ export SDL_VIDEODRIVER ?= dummy
 
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help venv benchmark test lint format types layers check audit images wheel clean
+.PHONY: help venv benchmark test lint format types layers check audit images docs docs-check wheel clean
 
 help: ## Show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
 
 # .begun marks an environment that is being made. Whoever finds it starts anew, because half an
 # install looks like a whole one. The last step turns the mark into the stamp.
@@ -68,6 +68,23 @@ audit: $(READY) ## Look up known vulnerabilities of the pinned packages
 images: $(READY) ## Draw the pictures of the documentation
 	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --reference staircase --load 2.55 --episode-seconds 40 --plot docs/images/muscle_positioning.png
 	$(BIN)/python docs/make_images.py
+
+$(VENV)/.docs: $(READY)
+	@$(INSTALL) --editable ".[docs]" --constraint constraints.txt
+	@touch $@
+
+build/docs-extra/board: $(READY)
+	$(BIN)/python -m benchmarks site --out $@
+
+build/docs-extra/playground: $(READY)
+	$(BIN)/python -m benchmarks playground --out $@
+
+docs: $(VENV)/.docs build/docs-extra/board build/docs-extra/playground ## Build the documentation site into build/docs
+	$(BIN)/python docs/make_notebooks.py --check
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --doctree-dir build/docs-doctrees --conf-dir docs . build/docs
+
+docs-check: docs ## Look for broken links and errors of the built site in a browser
+	$(BIN)/python -m tests.docs.site_checks build/docs
 
 wheel: $(READY) ## Build the wheel with compiled code of the default configurations
 	$(BIN)/python -m pam_envs.export.shipping

@@ -35,7 +35,7 @@ class Declaration:
     source : str
         The paper and place, or the reason for an assumption.
     neutral : float or None
-        The value that switches the effect off, where there is one.
+        The value [unit of the parameter] that switches the effect off, where there is one.
     spread : tuple of float or None
         Range over which domain randomization draws an assumed parameter, in ``unit``.
     """

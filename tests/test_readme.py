@@ -8,7 +8,13 @@ import pytest
 ROOT = Path(__file__).parents[1]
 SNIPPET = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#\s]+)")
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "SUPPORT.md",
+    ROOT / "RELEASING.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 
 
 def run_snippets(page: Path) -> dict[str, object]:
@@ -35,6 +41,12 @@ def test_snippets_with_other_libraries_run(tmp_path, monkeypatch):
     assert names["cost"] >= 0.0
     assert names["first"].shape == (64, 10)
     assert (tmp_path / "rig.csv").read_text().startswith("time_s,segment,pressure_command_bar")
+
+
+def test_snippets_of_the_start_page_run(capsys):
+    names = run_snippets(ROOT / "docs/start.md")
+    assert "mm, reference" in capsys.readouterr().out
+    assert abs(names["info"]["output"] - names["info"]["reference"]) < 1e-3  # m, after 10 s
 
 
 def test_snippets_of_the_orthosis_print_the_stated_output(capsys):

@@ -49,6 +49,7 @@ class Controller(Protocol):
         Returns
         -------
         action : ndarray of float32, shape (n_act,) or (n_env, n_act)
+            Scaled as the action space of the environment [-1 to 1, or SI].
         state : tuple of ndarray
         """
         ...

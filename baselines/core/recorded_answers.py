@@ -19,7 +19,9 @@ class RecordedAnswers:
     Attributes
     ----------
     observations : array of float32, shape (steps, n_signals)
+        Observations as returned by the environment, from -1 to 1.
     answers : array of float32, shape (steps, n_actions)
+        Actions of the controller as returned by ``predict``, from -1 to 1.
     """
 
     observations: Array

@@ -33,7 +33,8 @@ class PeriodicLearning:
     gain : float
         Share of an error that is added to the correction, between 0 and 2.
     largest : float
-        Limit of the correction: an error that the actuator cannot remove does not wind up.
+        Limit of the correction [unit of the reference]: an error that the actuator cannot remove
+        does not wind up.
     """
 
     period: float

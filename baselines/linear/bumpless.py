@@ -49,7 +49,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class BumplessGains:
-    """Gains ``K``, shape (*lanes, n), in the coordinates of the plant, and ``L``, below 1."""
+    """Gains ``K``, shape ``(*lanes, n)``, in the coordinates of the plant, and ``L``, below 1."""
 
     state_gain: Array
     direct_gain: float = 0.0
@@ -68,7 +68,7 @@ class BumplessGains:
 
 
 class BumplessState(NamedTuple):
-    """States of a controller and of its plant model, ``xi``, shapes (..., *lanes, n)."""
+    """States of a controller and of its plant model, ``xi``, shapes ``(..., *lanes, n)``."""
 
     controller: Array
     model: Array
@@ -112,11 +112,11 @@ class Bumpless:
         return replace(self, compensated=False)
 
     def initial_state(self, rows: int | tuple[int, ...] = ()) -> BumplessState:
-        """Return the state at rest, arrays of shape (*rows, *lanes, n)."""
+        """Return the state at rest, arrays of shape ``(*rows, *lanes, n)``."""
         return BumplessState(self.controller.initial_state(rows), self.model.initial_state(rows))
 
     def holding_state(self, command: Array) -> BumplessState:
-        """Return the state that holds a command, (..., *lanes), while the error is 0."""
+        """Return the state that holds a command, ``(..., *lanes)``, while the error is 0."""
         model = np.zeros((*command.shape, self.model.b.shape[-1]))
         return BumplessState(self.controller.holding_state(command), model)
 
@@ -128,7 +128,7 @@ class Bumpless:
         low: ArrayLike | None = None,
         high: ArrayLike | None = None,
     ) -> Array:
-        """Return the command of the active controller, shape (..., *lanes), within the limits.
+        """Return the command of the active controller, shape ``(..., *lanes)``, within the limits.
 
         ``low`` and ``high`` are limits at this instant, if a feedforward uses part of the range.
         """
@@ -146,7 +146,7 @@ class Bumpless:
         state: BumplessState,
         in_charge: ArrayLike = False,
     ) -> BumplessState:
-        """Return the state after a period with the command ``applied``, shape (..., *lanes).
+        """Return the state after a period with the command ``applied``, shape ``(..., *lanes)``.
 
         With a feedforward behind this controller, ``applied`` is the applied command less this
         controller's own feedforward. ``in_charge``, shape (...), marks rows in which this

@@ -40,7 +40,8 @@ class Gains(NamedTuple):
     Attributes
     ----------
     derivative : float
-        On the measurement, without a kick at reference steps.
+        Gain [s times the unit of the gains] on the derivative of the measurement, without a kick at
+        reference steps.
     filter_time : float
         Time constant [s] of the first-order filter on the derivative.
     tracking_time : float

@@ -127,8 +127,9 @@ class DiscreteSystem:
     """Systems ``x' = a x + b u``, ``y = c x + d u`` at a fixed period, one for each lane.
 
     A single system has no lane axis (``lanes`` is empty); the systems of all joints of an arm have
-    one: ``a`` is of shape (*lanes, n, n), ``b`` and ``c`` of (*lanes, n), ``d`` of lanes. Inputs
-    and outputs are of shape (..., *lanes), states of (..., *lanes, n). The period is in s.
+    one: ``a`` is of shape ``(*lanes, n, n)``, ``b`` and ``c`` of ``(*lanes, n)``, ``d`` of lanes.
+    Inputs and outputs are of shape ``(..., *lanes)``, states of ``(..., *lanes, n)``. The period is
+    in s.
     """
 
     a: Array
@@ -154,17 +155,17 @@ class DiscreteSystem:
         return replace(self, b=inputs * self.b, c=outputs * self.c, d=inputs * outputs * self.d)
 
     def initial_state(self, rows: int | Sequence[int] = ()) -> Array:
-        """Return zeros of shape (*rows, *lanes, n)."""
+        """Return zeros of shape ``(*rows, *lanes, n)``."""
         shape = (rows,) if isinstance(rows, int) else tuple(rows)
         return np.zeros((*shape, *self.b.shape))
 
     def rest_state(self, u: ArrayLike) -> Array:
-        """Return the equilibrium, shape (..., *lanes, n), under a constant input."""
+        """Return the equilibrium, shape ``(..., *lanes, n)``, under a constant input."""
         gain = np.linalg.solve(np.eye(self.b.shape[-1]) - self.a, self.b[..., None])[..., 0]
         return np.asarray(np.asarray(u, float)[..., None] * gain)
 
     def holding_state(self, y: ArrayLike) -> Array:
-        """Return the state, shape (..., *lanes, n), that holds an output without input.
+        """Return the state, shape ``(..., *lanes, n)``, that holds an output without input.
 
         For systems with one integrator, whose mode provides the whole output.
         """
@@ -177,11 +178,11 @@ class DiscreteSystem:
         return self.output(u, state), self.advance(u, state)
 
     def output(self, u: ArrayLike, state: Array) -> Array:
-        """Return the output, shape (..., *lanes)."""
+        """Return the output, shape ``(..., *lanes)``."""
         return np.asarray(np.add.reduce(state * self.c, axis=-1) + self.d * np.asarray(u, float))
 
     def advance(self, u: ArrayLike, state: Array) -> Array:
-        """Return the next state, shape (..., *lanes, n)."""
+        """Return the next state, shape ``(..., *lanes, n)``."""
         free = np.add.reduce(self.a * state[..., None, :], axis=-1)
         return np.asarray(free + np.asarray(u, float)[..., None] * self.b)
 

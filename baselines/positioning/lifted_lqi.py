@@ -118,7 +118,7 @@ class LiftedLqi(RowController):
 
 
 def lifted(model: DiscreteSystem) -> tuple[Array, Array]:
-    """Return ``A^N`` and ``[A^(N-1) B ... B]`` of a frame."""
+    """Return the matrices ``A^N`` and ``[A^(N-1) B, A^(N-2) B, up to B]`` of a frame."""
     powers = [np.linalg.matrix_power(model.a, k) for k in range(FRAME + 1)]
     return powers[FRAME], np.array([power @ model.b for power in powers[FRAME - 1 :: -1]]).T
 

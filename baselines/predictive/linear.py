@@ -34,8 +34,11 @@ class LinearPredictor:
     Attributes
     ----------
     curve, by_reference : ndarray, shape (N, N)
+        Curvature of the cost, and its derivative by the references [units of the model].
     by_state : ndarray, shape (N, n)
+        Derivative by the state [units of the model].
     by_last : ndarray, shape (N, 1)
+        Derivative by the last input [units of the model].
     """
 
     curve: Array
@@ -59,13 +62,13 @@ class LinearPredictor:
         Parameters
         ----------
         state : ndarray, shape (n_env, n)
-            Present state.
+            Present state [units of the model].
         last : ndarray, shape (n_env,)
-            Present input.
+            Present input [unit of the input].
         reference : ndarray, shape (n_env, N)
-            References of the periods 1 to N.
+            References of the periods 1 to N [unit of the output].
         low, high : float or ndarray, shape (n_env,)
-            Limits of the input.
+            Limits of the input [unit of the input].
         """
         force = _product(self.by_state, state) + _product(self.by_last, last[:, None])
         force = force - _product(self.by_reference, reference)
@@ -95,9 +98,9 @@ def linear_predictor(a: Array, b: Array, c: Array, weight: float, horizon: int) 
     Parameters
     ----------
     a, b, c : ndarray, shapes (n, n), (n,), (n,)
-        Model of one input and one output.
+        Model of one input and one output, which defines the units.
     weight : float
-        Of a squared change of the input over that of a squared error, above 0.
+        Weight of a squared change of the input over that of a squared error, above 0.
     horizon : int
         Periods N, at least 1.
     """

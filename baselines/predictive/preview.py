@@ -34,7 +34,7 @@ class PreviewMemory:
     ahead : ndarray of int, shape (n_samples,)
         Times of the previewed samples from the present, the present one first.
     stride : float
-        Period of the reference; infinite if it has none.
+        Period of the reference [control periods]; infinite if it has none.
     size : int
         Samples that are kept.
     """

@@ -30,11 +30,11 @@ def best_path(start: ArrayLike, path: ArrayLike, weight: ArrayLike, reach: Array
     Parameters
     ----------
     start : array_like, shape (n_env,)
-        Present value.
+        Present value [unit of the path].
     path, weight : array_like, shape (n_env, n_nodes)
-        Desired values, and weights of the squared errors, above 0.
+        Desired values [any unit], and weights of the squared errors, above 0.
     reach : array_like, shape (n_nodes,) or (n_env, n_nodes)
-        Largest change from the node before, above 0.
+        Largest change [unit of the path] from the node before, above 0.
     """
     desired = np.ascontiguousarray(path, float)
     n, nodes = desired.shape

@@ -56,7 +56,7 @@ class Arrival(NamedTuple):
     Attributes
     ----------
     pressures : ndarray, shape (n_stages, n_env)
-        Ends of the stages; the last one is that at which the setpoint takes effect.
+        Ends of the stages [Pa]; the last one is that at which the setpoint takes effect.
     delay : ndarray, shape (n_env,)
         Dead time [periods].
     lag, rate : ndarray, shape (n_env,)

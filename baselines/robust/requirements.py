@@ -72,9 +72,9 @@ class RobustDesign:
     bandwidth : float
         Of the sensitivity [rad/s]; required with ``g``.
     peak : float
-        Bound on the sensitivity at high frequencies; assumed.
+        Bound [1] on the sensitivity at high frequencies; assumed.
     at_rest : float
-        Bound on the static sensitivity; above 0, for a stable weight; assumed.
+        Bound [1] on the static sensitivity; above 0, for a stable weight; assumed.
     neglected_low, neglected_high : float
         ``|W_m|`` at low and at high frequencies; assumed.
     neglected_corner : float

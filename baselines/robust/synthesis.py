@@ -11,8 +11,8 @@ extra. The steps:
    rank-one matrix at hand ``d_i^2 = 1 / |a_i|``), fitted by a stable system with a stable
    inverse, and the synthesis is repeated; the controller of the round with the smallest ``mu``.
 3. Modes beyond ``FAST`` are replaced by their static gain; the slowest mode, an approximate
-integrator, is replaced by an exact one; the rest is reduced by balanced residualisation to
-``ORDER`` states.
+   integrator, is replaced by an exact one; the rest is reduced by balanced residualisation to
+   ``ORDER`` states.
 
 The reduction (fernando1982) balances a system and replaces the states with the smallest Hankel
 singular values by their equilibrium instead of truncating them: the static gain stays exact, and

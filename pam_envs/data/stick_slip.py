@@ -27,7 +27,7 @@ class StickSlipRecord:
     Attributes
     ----------
     time : ndarray
-        Seconds.
+        Time of each sample [s].
     force : ndarray
         Force of the motor on the tendon [N].
     displacement, velocity : ndarray

@@ -111,7 +111,8 @@ def preisach_step(
     Parameters
     ----------
     x : float
-        Input. Beyond the table's range it counts as the nearest end; not-a-number counts as low.
+        Input [unit of the table]. Beyond the table's range it counts as the nearest end;
+        not-a-number counts as low.
     stack, sums : rows of float, shape (depth, lanes)
         Extrema and the outputs there; changed in place. ``depth`` is at least 3.
     count : row of int, shape (lanes,)

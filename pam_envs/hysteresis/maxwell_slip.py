@@ -50,7 +50,7 @@ class PlayOperator(ParallelElements, HysteresisModel):
         Slope that each play adds when it moves, output unit per input unit. Not negative for a
         passive, invertible operator.
     linear : float
-        Slope of the hysteresis-free part.
+        Slope of the hysteresis-free part [unit of the output per unit of the input].
     """
 
     kind: ClassVar[str] = "maxwell_slip"
@@ -219,7 +219,7 @@ class MaxwellSlip(ParallelElements):
     Parameters
     ----------
     spring : float
-        Stiffness of the spring that never slips, force unit per length unit, at least 0.
+        Stiffness of the spring that never slips [force per length], at least 0.
     stiffnesses : tuple of float
         Stiffnesses ``k`` of the elements, at least 0.
     break_displacements : tuple of float

@@ -333,7 +333,7 @@ class ModifiedMaxwellSlip(ParallelElements, HysteresisModel):
         return np.array(self.break_stiffnesses), np.array(self.stiffnesses), slope
 
     def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
-        """Return the slip positions after inflation and venting, shape (*batch_shape, n).
+        """Return the slip positions after inflation and venting, shape ``(*batch_shape, n)``.
 
         An element that does not slip over the whole range starts from the middle of the range.
         """

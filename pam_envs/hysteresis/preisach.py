@@ -63,7 +63,7 @@ class Preisach(HysteresisModel):
     Parameters
     ----------
     low, high : float
-        Range of the input; an input beyond it counts as the nearest end.
+        Range [unit of the input]; an input beyond it counts as the nearest end.
     table : array_like, shape (n, n)
         Everett map at ``n >= 2`` evenly spaced inputs, antisymmetric, of relay weights that are
         nowhere negative; kept as a tuple of tuples. Interpolated bilinearly in between.
@@ -74,7 +74,7 @@ class Preisach(HysteresisModel):
         ``low = -high`` and a map with ``mu(a, b) = mu(-b, -a)``. A muscle at ``"low"`` has always
         been vented to ``low`` before.
     start_output : float
-        Output at the beginning. 0 for a virgin start.
+        Output at the beginning [unit of the output]. 0 for a virgin start.
 
     Raises
     ------

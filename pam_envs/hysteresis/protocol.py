@@ -149,9 +149,9 @@ class Usage:
     start : {"virgin", "low"}
         State at the beginning: demagnetised at 0, or vented to the lowest input.
     full : float or None
-        Largest input, if the plant fixes it.
+        Largest input [unit of the input], if the plant fixes it.
     reach : float
-        Smallest range on either side of 0 that the operator needs to span.
+        Smallest range [unit of the input] on either side of 0 that the operator needs to span.
     unit_slope : bool
         True if input and output are the same quantity: the total slope is 1.
     """

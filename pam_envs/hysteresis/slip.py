@@ -361,8 +361,8 @@ class PreisachSlip(SlipModel):
     Parameters
     ----------
     low, high : float
-        Range of the input over which the density is given; the density of the last cell continues
-        beyond it.
+        Range [unit of the input] over which the density is given; the density of the last cell
+        continues beyond it.
     thresholds : tuple of float, shape (n,)
         Half-gaps of the relays, rising, in the unit of the input.
     densities : tuple of tuple of float, shape (n, cells)

@@ -80,7 +80,7 @@ def yielded(z: float, moved: float, ratio: float) -> tuple[float, float]:
     moved : float
         Motion over the break ``b``.
     ratio : float
-        From 0 to 1, see the module.
+        Ratio of the module, from 0 to 1.
     """
     sign, left = (1.0, moved) if moved >= 0.0 else (-1.0, -moved)
     y = z * sign

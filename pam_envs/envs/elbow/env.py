@@ -30,10 +30,11 @@ With more muscles than three and seven the ranges of torque and stiffness are la
 Action: pressure_a_set_point and pressure_b_set_point, 0 .. 6e5 Pa; with on/off valves pulse_a and
 pulse_b, -0.05 .. 0.05 s, of which one in 50 ms is taken, positive to fill; or torque and stiffness.
 
-Reward, each control period: ``- |torque error| / 0.5 N m - 0.2 |stiffness error| / 0.5 N m/rad
-- 0.2 (change of both setpoints) / 12 bar`` (on/off valves: the last pulse widths / 0.1 s). Where a
-  stop ends the episode, ``reward/ended`` adds the lowest possible reward of each remaining period,
-  so that a policy never gains by ending an episode.
+Reward, each control period:
+``- |torque error| / 0.5 N m - 0.2 |stiffness error| / 0.5 N m/rad - 0.2 (change of both setpoints)
+/ 12 bar`` (on/off valves: the last pulse widths / 0.1 s). Where a stop ends the episode,
+``reward/ended`` adds the lowest possible reward of each remaining period, so that a policy never
+gains by ending an episode.
 
 Start: at rest where the wearer holds the forearm, under the pressures for the references there
 (``start="random"``: under random pressures up to half the range). End: truncated after

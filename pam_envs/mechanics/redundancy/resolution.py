@@ -67,7 +67,8 @@ class Resolution:
     angles : ndarray, shape (m, n)
         [rad].
     multipliers : ndarray, shape (m, 5)
-        Lagrange multipliers of (2.2), from which a later path may continue.
+        Lagrange multipliers [cost per unit of the constraint] of (2.2), from which a later path may
+        continue.
     iterations : ndarray of int, shape (m,)
         Newton iterations that each pose took.
     limit : float

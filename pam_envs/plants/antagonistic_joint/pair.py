@@ -376,9 +376,10 @@ def feed_forward(fixed: Any, j: int, angle: float, prestress: float) -> tuple[fl
     Returns
     -------
     pressure_a, pressure_b : float
-        Within the regulators' range.
+        Pressures [Pa] within the regulators' range.
     short : float
-        1 where the angle is out of reach: beyond its limit, or without force at full pressure.
+        Flag [0 or 1], 1 where the angle is out of reach: beyond its limit, or without force at full
+        pressure.
     """
     limit = fixed[K.LINK_LIMIT][j]
     held = max(-limit, min(limit, angle))

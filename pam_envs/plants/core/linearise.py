@@ -48,9 +48,9 @@ class Equilibrium:
     outputs : callable
         From state to output, shape (p,).
     state, command : ndarray, shapes (n,) and (m,)
-        Point of rest.
+        Point of rest [SI].
     steps : ndarray, shape (n + m,)
-        Half widths of the central differences of state and input.
+        Half widths of the central differences of state and input [SI].
     names : tuple of tuple of str
         Names of states, inputs and outputs.
     """

@@ -80,7 +80,7 @@ class Plant:
     family : str
         Name in files.
     control_period : float
-        Seconds.
+        Time between two commands [s].
     components : tuple of str
         Names of the components, in the order of a file.
     names : tuple of str
@@ -306,7 +306,7 @@ class Plant:
         Parameters
         ----------
         spread : array_like, shape (n, 3)
-            Row of each parameter that is drawn, and its range.
+            Row of each parameter that is drawn, and its range [SI].
         """
         drawn = {self.names[int(row[0])] for row in np.asarray(spread, float).reshape(-1, 3)}
         return self.extended or not drawn.isdisjoint(self.neutral)

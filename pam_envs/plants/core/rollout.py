@@ -184,7 +184,7 @@ class Loop:
     rows, parameters, counts, work : int
         Rows of state, parameters, whole numbers and scratch.
     extra : ndarray
-        Two-dimensional table that the step reads in addition to that of the hysteresis.
+        Two-dimensional table [SI] that the step reads in addition to that of the hysteresis.
     """
 
     name: str
@@ -283,7 +283,7 @@ def run(
     columns : array_like, shape (n, n_parameters)
         Parameter sets; the last serves all further columns of ``drives``, up to ``plants``.
     drives : ndarray, shape (channels, T, n or 1)
-        See :func:`drives_of`.
+        Inputs [SI], see :func:`drives_of`.
     flags : array_like of int, shape (T,), optional
         Default: begin with the first control period.
     before : bool

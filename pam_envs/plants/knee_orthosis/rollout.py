@@ -104,7 +104,7 @@ def simulate_knee(
     set_points : array_like, shape (T,) or (T, n)
         Setpoints [Pa], one a control period.
     phase : float
-        Phase of the stride at the start, in turns.
+        Phase of the stride at the start [turns].
     pressure : float
         Pressure [Pa] of the rest, reached by inflation from none.
     compiled : bool

@@ -121,7 +121,7 @@ def strains_of_rest(
     elements : tuple
         :attr:`SlipModel.arrays`.
     sliders : array_like, shape (..., n)
-        Positions of the sliders before.
+        Positions of the sliders before [strain].
     """
     held, given = (
         np.asarray(sliders, float),

@@ -171,7 +171,7 @@ def simulate_rows(
     plant : SingleMuscle
         Gives the hysteresis kind, the Everett map and the sub-steps.
     parameters : array, shape (n, n_parameters)
-        Columns as of :meth:`SingleMuscle.parameter_rows`.
+        Columns as of :meth:`SingleMuscle.parameter_rows` [SI].
     set_points : array_like, shape (T,) or (T, n)
         Setpoints [Pa], one a control period.
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import NAMES, Browser, PageError, find
 
 from benchmarks.exported import differing
 from benchmarks.playground import page
 from benchmarks.playground.replay import replay, sweep
 from benchmarks.playground.scenes import SCENES
 from pam_envs.kernels.build import COMPILED
+from tests.browser import NAMES, Browser, PageError, find
 
 pytest.importorskip("ziglang")
 pytestmark = [

@@ -172,6 +172,8 @@ def _fault(message: Any) -> str | None:
             return _described(message["params"]["exceptionDetails"])
         case "Log.entryAdded" if message["params"]["entry"]["level"] == "error":
             return str(message["params"]["entry"]["text"])
+        case "Runtime.consoleAPICalled" if message["params"]["type"] == "error":
+            return " ".join(str(argument.get("value")) for argument in message["params"]["args"])
         case "Inspector.targetCrashed":
             return "the page has crashed"
     return None

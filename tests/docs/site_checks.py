@@ -1,0 +1,104 @@
+"""Checks of the built documentation site: ``python -m tests.docs.site_checks build/docs``.
+
+Links and files without a browser; errors, loading from the network and sideways scrolling with one.
+"""
+
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+from tests.browser import NAMES, Browser, PageError, find
+
+PHONE = (390, 844)
+"""Width and height of a phone [CSS pixels]."""
+TOO_WIDE = """(() => {
+  const root = document.documentElement, width = root.clientWidth;
+  if (root.scrollWidth <= width) return "";
+  const wide = [...document.querySelectorAll("article *")]
+    .filter((one) => one.getBoundingClientRect().right > width + 1);
+  return `${root.scrollWidth} pixels wide instead of ${width}: `
+    + wide.slice(0, 3).map((one) => one.outerHTML.slice(0, 80)).join(" | ");
+})()"""
+"""Expression: the first elements beyond the right edge, empty if the page does not scroll."""
+
+
+class Links(HTMLParser):
+    """Anchors of a page, its links, and the files that it loads."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Collect the attributes of an element."""
+        given = {name: value for name, value in attrs if value}
+        self.anchors.update(given[key] for key in ("id", "name") if key in given)
+        if tag == "a" and "href" in given:
+            self.links.append(given["href"])
+        loads = [given.get("src"), given.get("href") if tag == "link" else None]
+        self.loaded += [address for address in loads if address]
+
+
+def pages(folder: Path) -> list[Path]:
+    """Return the pages of a site."""
+    return sorted(folder.rglob("*.html"))
+
+
+def broken_links(folder: Path) -> Iterator[str]:
+    """Return the links to files or anchors that do not exist, and what is loaded from elsewhere."""
+    found = {page: Links(page) for page in pages(folder)}
+    for page, links in found.items():
+        shown = page.relative_to(folder)
+        for address in links.loaded:
+            if urlsplit(address).scheme in ("http", "https") or address.startswith("//"):
+                yield f"{shown} loads {address} from the network"
+        for address in [*links.links, *links.loaded]:
+            parts = urlsplit(address)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
+            if not target.is_file():
+                yield f"{shown} links to {address}, which does not exist"
+            elif parts.fragment and target.suffix == ".html":
+                there = found[target] if target in found else Links(target)
+                if unquote(parts.fragment) not in there.anchors:
+                    yield f"{shown} links to {address}, which has no such anchor"
+
+
+def faults_in_browser(chosen: Iterable[Path], program: str) -> Iterator[str]:
+    """Return console errors and sideways scrolling of pages on a phone."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Browser(program, Path(folder) / "profile") as browser,
+    ):
+        for path in chosen:
+            try:
+                with browser.page(path.as_uri()) as page:
+                    page.resize(*PHONE)
+                    if wide := page.evaluate(TOO_WIDE):
+                        yield f"{path}: {wide}"
+            except PageError as error:
+                yield f"{path}: {error}"
+
+
+def main() -> None:
+    """Check a built site; exit with the list of its faults."""
+    folder = Path(sys.argv[1]).resolve()
+    faults = list(broken_links(folder))
+    program = find()
+    if program is None:
+        print(f"no browser here: install one of {', '.join(NAMES)} to check the pages in it")
+    else:
+        faults += faults_in_browser(pages(folder), program)
+    print(f"{len(pages(folder))} pages, {len(faults)} faults", *faults, sep="\n")
+    sys.exit(bool(faults))
+
+
+if __name__ == "__main__":
+    main()
