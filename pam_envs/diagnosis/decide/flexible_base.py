@@ -140,13 +140,13 @@ class FlexibleBase:
         It names those with a clear gain; the parameters of the others remain, as a calibration.
         """
         data = (self.problem, self.blocks, self.base)
-        kept_for_sure: set[str] = set()  # the fewer others remain, the more they are needed
+        needed: set[str] = set()  # the fewer others remain, the more they are
         while any(cause.common for cause, _ in model.causes):
             expected = self.expected(model)
-            kept_for_sure |= {name for name, gain in expected.items() if gain > OBVIOUS}
-            smaller = without_each_cause(*data, model, set(expected) - kept_for_sure, CLEAR)
+            doubtful = {n for n, gain in expected.items() if gain <= OBVIOUS and n not in needed}
+            smaller = without_each_cause(*data, model, doubtful, CLEAR)
             losses = {name: self.loss(less, model) for name, less in smaller.items()}
-            kept_for_sure |= {name for name, loss in losses.items() if loss > CLEAR}
+            needed |= {name for name, loss in losses.items() if loss > CLEAR}
             least = min(losses, key=lambda name: losses[name], default="")
             if losses.get(least, np.inf) > 0.0:
                 gains = {n: self.blocks.gain(c.errors, model.errors) for n, c in smaller.items()}
