@@ -30,7 +30,6 @@ SINGLE = [
     Case("single", SEED + k, (name,), (SIZE,))
     for k, name in (
         (1, "creep"),
-        (3, "leak"),
         (4, "hysteresis_drive"),
         (8, "stick_slip"),
     )
@@ -38,13 +37,9 @@ SINGLE = [
 ADEQUATE = [Case("clean", SEED)]
 OTHER_WORLDS = [
     Case("single", WORLD_SEED + 1, ("creep",), (SIZE,), world=EXPONENTIAL),
-    Case("single", WORLD_SEED + 2, ("leak",), (SIZE,), world=POLYNOMIAL),
     Case("single", WORLD_SEED + 3, ("leak",), (SIZE,), world=BUMPY),
 ]
-CLEAN_WORLDS = [
-    Case("clean", WORLD_SEED, world=EXPONENTIAL),
-    Case("clean", WORLD_SEED + 4, world=POLYNOMIAL),
-]
+CLEAN_WORLDS = [Case("clean", WORLD_SEED + 4, world=POLYNOMIAL)]
 IDLE = Case("idle", SEED + 82, campaign="idle")
 
 
