@@ -522,12 +522,12 @@ def block(language: str, place: int = 0) -> str:
 
 def test_examples_of_the_page_are_readable(tmp_path):
     assert Rig.from_yaml(rig_file(tmp_path, block("yaml"))) == SHOWN
-    lines = block("csv").splitlines()
+    lines = block("text").splitlines()
     more = [f"{0.06 + 0.02 * i:.2f},staircase,1.5,1.4,3.0,25.0" for i in range(20)]
     recording = read_input(file_of(tmp_path, *lines, *more))
     assert isinstance(recording, Recording)
     assert recording.segments == ("rest", "staircase")
-    readings = read_input(file_of(tmp_path, *block("csv", 1).splitlines()))
+    readings = read_input(file_of(tmp_path, *block("text", 1).splitlines()))
     assert readings.cycle(2.55, 1)[0].tolist() == [0.0, 5e4, 0.0]
 
 
