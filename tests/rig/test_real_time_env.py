@@ -23,6 +23,16 @@ REST = 0.5  # s, 50 control periods and one more
 PERIOD = 0.01
 
 
+class Wrapped:
+    """A driver around another one."""
+
+    def __init__(self, driver):
+        self.inner = driver
+
+    def __getattr__(self, name):
+        return getattr(self.inner, name)
+
+
 def rig(seconds=1.0, true=None, limits=LIMITS, log=None, wrap=lambda driver: driver, **timing):
     """Return a rig of one plant, or of another plant than its twin, with imperfect timing."""
     clock = SimulatedClock()
@@ -149,13 +159,7 @@ def test_reading_outside_its_limits_stops():
 
 
 def test_reading_that_is_no_number_counts_as_lost():
-    class Broken:
-        def __init__(self, driver):
-            self.inner = driver
-
-        def __getattr__(self, name):
-            return getattr(self.inner, name)
-
+    class Broken(Wrapped):
         def read(self):
             sample = self.inner.read()
             broken = self.inner.readings > 60
@@ -208,13 +212,7 @@ def test_lost_sample_at_rest_prevents_the_start():
 
 
 def test_zeroed_sensor_reads_zero_after_the_rest():
-    class Shifted:
-        def __init__(self, driver):
-            self.inner = driver
-
-        def __getattr__(self, name):
-            return getattr(self.inner, name)
-
+    class Shifted(Wrapped):
         def read(self):
             sample = self.inner.read()
             moved = sample.values["contraction"] + 0.1

@@ -181,13 +181,11 @@ class FlexibleBase:
             if not cause.common or not places:
                 continue
             frees = [fit.frees[k] for k in places]
-            off = np.array([neutral[f.place] for f in frees])
-            if not all(np.isfinite(off)) or any(
-                f.log and v <= 0.0 for f, v in zip(frees, off, strict=True)
-            ):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                moved = np.array([f.inner(neutral[f.place]) for f in frees]) - fit.z[places]
+            if not np.isfinite(moved).all():
                 found[cause.name] = 0.0
                 continue
-            moved = [f.inner(float(v)) for f, v in zip(frees, off, strict=True)] - fit.z[places]
             more = float(moved @ np.linalg.pinv(spread[np.ix_(places, places)]) @ moved)
             found[cause.name] = float(np.log1p(more / max(fit.cost, 1e-12)))
         return found

@@ -163,7 +163,7 @@ class Balance:
         ends = np.cumsum([first, *(len(f.columns) for f in tried)])
         precision = np.zeros(len(columns))
         precision[first - len(maps) : first] = MAP_PRIOR**-2
-        low = np.full(len(columns), 0.0)
+        low = np.zeros(len(columns))
         low[:first] = np.append(self._lowest(), np.full(len(maps), -np.inf))
         chosen: list[int] = []
 
@@ -249,7 +249,7 @@ class Balance:
         return np.array([chebval(u, eye[i]) * chebval(s, eye[j]) for i, j in MAP_TERMS])
 
     def _lowest(self) -> Array:
-        """Return the least coefficients of law and plays."""
+        """Return the least coefficients of law, plays and lateness."""
         low = np.full(len(LAW) + len(self.gaps), -np.inf)
         low[[0, 3]] = 0.0
         low[len(LAW) :] = 0.0

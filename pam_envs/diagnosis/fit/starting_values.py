@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.diagnosis.fit.least_squares import Fit, PlantFamily, Problem, column_of
 
 Starts = Sequence[tuple[float, ...]]
@@ -35,18 +36,13 @@ def step_starts(
     slopes = base.slopes[:, : problem.seen]
     every = np.array([problem.rows(row)[output] for row in base.slopes])
     moved = np.where(good, every, 0.0)
-    normal = np.einsum("im,jm->ij", slopes, slopes)
-    inverse = np.linalg.pinv(normal, rcond=1e-9)
     tails = np.cumsum(residual[::-1])[::-1]
     counts = np.cumsum(good[::-1])[::-1].astype(float)
-    along = np.cumsum(moved[:, ::-1], axis=1)[:, ::-1]
-    norm = counts - np.einsum("it,ij,jt->t", along, inverse, along)
+    norm = counts - _taken(moved, np.einsum("im,jm->ij", slopes, slopes))
     if len(problem.shapes):
         # orthogonal to the Jacobian, since residuals are without them
         shapes = np.where(good, problem.shapes, 0.0)
-        after = np.cumsum(shapes[:, ::-1], axis=1)[:, ::-1]
-        inner = np.linalg.pinv(shapes @ shapes.T, rcond=1e-9)
-        norm -= np.einsum("it,ij,jt->t", after, inner, after)
+        norm -= _taken(shapes, shapes @ shapes.T)
     edge = max(1, round(EARLIEST * samples))
     score = np.where(norm > 1.0, tails**2 / np.maximum(norm, 1.0), 0.0)
     score[:edge] = score[samples - edge :] = 0.0
@@ -60,6 +56,16 @@ def step_starts(
         reach = round(APART * samples)
         score[max(0, k - reach) : k + reach] = 0.0
     return starts
+
+
+def _taken(rows: Array, gram: Array) -> Array:
+    """Return the square of a step at each sample that rows (k, T) take up, (T,).
+
+    ``gram`` are the inner products of the rows on all samples that a fit sees.
+    """
+    after = np.cumsum(rows[:, ::-1], axis=1)[:, ::-1]
+    inverse = np.linalg.pinv(gram, rcond=1e-9)
+    return np.asarray(np.einsum("it,ij,jt->t", after, inverse, after))
 
 
 step_starts.trials = 100  # type: ignore[attr-defined]
