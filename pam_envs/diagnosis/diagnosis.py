@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from pam_envs.arrays import Array, Flags
 from pam_envs.constants import CELSIUS, GRAVITY
@@ -114,7 +115,7 @@ def diagnose(
     started = clock.perf_counter()
     rule, sheet = rule or Rule(), rig or Rig()
     asked = selected(causes)
-    with fit_failures_explained(), steps(progress) as step:
+    with threadpool_limits(1, "blas"), fit_failures_explained(), steps(progress) as step:
         step("checking the data")
         checked = audit(recording, sheet)
         if checked.problems:

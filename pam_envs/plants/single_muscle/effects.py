@@ -33,6 +33,7 @@ from pam_envs.muscle.effective_area import law_and_slope, tension, tension_slope
 from pam_envs.muscle.effects import (
     map_force,
     map_on,
+    map_slopes,
     slip_strands,
     stiffening,
     strand_forces,
@@ -239,8 +240,7 @@ def law_of(
 def pull_at_rest(fixed: Any, j: int, drive: float, e: float, stiffer: float) -> float:
     """Return the force [N] of the static law and its map at an effective pressure [Pa]."""
     pull, _ = law_of(fixed, j, drive, drive, e, stiffer)
-    more, _, _ = map_force(fixed, j, R.MUSCLE_MAP_05, drive, e)
-    return pull + more
+    return pull + map_force(fixed, j, R.MUSCLE_MAP_05, drive, e)
 
 
 @routine
@@ -416,8 +416,8 @@ def mapped_pull(
     _, _, _, shift = carried(fixed, j, rows[R.LOAD][j])
     e = x / fixed[R.MUSCLE_REST_LENGTH][j]
     middle = 0.5 * (was + rows[R.DRIVE][j]) - shift
-    more, _, _ = map_force(fixed, j, R.MUSCLE_MAP_05, was - shift, e)
-    _, steeper, wider = map_force(fixed, j, R.MUSCLE_MAP_05, middle, e)
+    more = map_force(fixed, j, R.MUSCLE_MAP_05, was - shift, e)
+    steeper, wider = map_slopes(fixed, j, R.MUSCLE_MAP_05, middle, e)
     return pull + more, slope + steeper, mass, hung, eased, loss, area + wider
 
 
