@@ -273,15 +273,11 @@ def map_force(sizes: Any, j: int, first: int, drive: float, strain: float) -> fl
     f0, f1, f2, f3, f4, f5 = strain_polynomials(sizes, j, first, s)
     t2 = t * t
     force = f0 + f1 * t + f2 * (2.0 * t2 - 1.0) + f3 * (4.0 * t2 - 3.0) * t
-    return (
-        force + f4 * (8.0 * (t2 * t2 - t2) + 1.0) + f5 * (16.0 * t2 * t2 - 20.0 * t2 + 5.0) * t
-    )
+    return force + f4 * (8.0 * (t2 * t2 - t2) + 1.0) + f5 * (16.0 * t2 * t2 - 20.0 * t2 + 5.0) * t
 
 
 @kernel
-def map_slopes(
-    sizes: Any, j: int, first: int, drive: float, strain: float
-) -> tuple[float, float]:
+def map_slopes(sizes: Any, j: int, first: int, drive: float, strain: float) -> tuple[float, float]:
     """Return minus the derivative of :func:`map_force` by strain [N], and that by pressure [m2]."""
     t, per_pressure = map_coordinate(drive, sizes[first + MAP.map_pressure][j])
     s, per_strain = map_coordinate(strain, sizes[first + MAP.map_strain][j])

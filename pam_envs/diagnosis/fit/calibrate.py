@@ -20,7 +20,15 @@ from pam_envs.diagnosis.fit.least_squares import (
     evaluate,
     improve,
 )
-from pam_envs.diagnosis.fit.single_muscle import CLOCK, LAG, ORIFICES, PILOT, MuscleFamily
+from pam_envs.diagnosis.fit.single_muscle import (
+    CLOCK,
+    LAG,
+    ORIFICES,
+    PILOT,
+    MuscleFamily,
+    spanning,
+    states_of,
+)
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.flow import REPLACED
@@ -59,8 +67,9 @@ def calibrate(
     the forms of a limited rate that the regulator may have.
     """
     extra = np.zeros((0, 0)) if shapes is None else shapes
-    longest = float(np.nanmax(measured[0], initial=0.0))
-    family = dataclasses.replace(family, longest=longest)
+    pressure = np.where(np.isfinite(measured[1]), measured[1], np.maximum(0, family.inputs.command))
+    states = states_of(measured[0], pressure, family.plant)
+    family = dataclasses.replace(family, plant=spanning(family.plant, states), states=states)
     problem = Problem(
         family.simulate,
         measured,
