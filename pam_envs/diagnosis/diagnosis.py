@@ -3,7 +3,7 @@
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import audit
 from pam_envs.diagnosis.audit.noise import ChannelFloor, Floor, noise_floor
-from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.cause import Cause, Form
 from pam_envs.diagnosis.causes import by_name, selected
 from pam_envs.diagnosis.closed_loop import gain as loops
 from pam_envs.diagnosis.decide import isolability as iso
@@ -45,6 +45,7 @@ from pam_envs.diagnosis.report.summary import report_of
 from pam_envs.diagnosis.report.summary_causes import judged
 from pam_envs.plants.core.plant import UnstableParameters
 from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.pneumatics.flow import REPLACED
 
 UNDECLARED, BELIEVED = 1.15, 1.5
 """Noise over the estimate from repeats or holds: without a declaration, and the largest declared
@@ -174,6 +175,23 @@ def fit_failures_explained() -> Iterator[None]:
         yield
     except (UnstableParameters, np.linalg.LinAlgError) as error:
         raise ValueError(ADVICE) from error
+
+
+ORIFICES_REPLACE = "flow through the orifices of the valve is modelled instead"
+
+
+def acting(causes: Sequence[Cause], plant: SingleMuscle) -> tuple[list[Cause], list[str]]:
+    """Return causes with the forms that act on a plant, and the names of those without any."""
+    if plant.air != "flow":
+        return list(causes), []
+    without = {f"regulator.{name}" for name in REPLACED}
+
+    def acts(form: Form) -> bool:
+        """Return whether no amount of a form is replaced."""
+        return not any(term.amount and term.name in without for term in form.terms)
+
+    made = [replace(c, forms=tuple(filter(acts, c.forms))) for c in causes]
+    return [c for c in made if c.forms], [c.name for c in made if not c.forms]
 
 
 EXCHANGE = (0.06, 0.6)
@@ -325,9 +343,11 @@ class Study:
 
     def find_testable(self, causes: Sequence[Cause]) -> None:
         """Keep the causes that the recording can show."""
+        causes, replaced = acting(causes, self.family.plant)
         self.isolability, self.not_testable = not_testable(
             self.problem, self.family, self.normal.fit, causes, self.recording, self.sheet
         )
+        self.not_testable |= dict.fromkeys(replaced, ORIFICES_REPLACE)
         common = {cause.name for cause, _ in self.normal.causes}
         self.causes = [c for c in causes if c.name not in {*self.not_testable, *common}]
         self.unseen = unseen_rivals(

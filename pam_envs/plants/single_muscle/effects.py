@@ -45,7 +45,10 @@ from pam_envs.muscle.effects import (
 )
 from pam_envs.plants.core.sensors import begin_with_effects, effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
+from pam_envs.plants.single_muscle.hysteresis_kernels import (
+    friction_per_load,
+    hysteresis_kernels,
+)
 from pam_envs.plants.single_muscle.rows import STATE as S
 from pam_envs.pneumatics.enclosed_air import (
     AHEAD,
@@ -139,7 +142,10 @@ def effective_pressure(
         )
         drive[j] = true[j] - (1.0 + fixed[R.HYSTERESIS_FIRST_WIDTH][j] * new) * friction[j]
     for j in range(first, last if yields > 0 else first):
-        drive[j] = drive[j] - fixed[R.HYSTERESIS_YIELD_WIDTH][j] * rows[EFFECTS_AT + S.yielding][j]
+        width = fixed[R.HYSTERESIS_YIELD_WIDTH][j] * friction_per_load(
+            fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j]
+        )
+        drive[j] = drive[j] - width * rows[EFFECTS_AT + S.yielding][j]
     if creeps > 0:
         for j in range(first, last):
             most[j] = 0.0
@@ -450,6 +456,11 @@ def forces(
             rows, fixed, EFFECTS_AT + S.deflection, R.MUSCLE_YIELD_FORCE, strain, rows[R.DRIVE],
             friction, sticking,
         )  # fmt: skip
+    if strands + deflects > 0:
+        for j in range(LANES):
+            wide = friction_per_load(fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j])
+            friction[j] = friction[j] * wide
+            sticking[j] = sticking[j] * wide
     if maps > 0:
         for j in range(LANES):
             found = mapped_pull(rows, fixed, j, was[j], x[j] + 0.5 * h * v[j])
