@@ -38,23 +38,29 @@ def causes_in(folder: str | Path) -> tuple[Cause, ...]:
     return tuple(sorted(made, key=lambda cause: cause.name))
 
 
-def by_name(name: str) -> Cause:
-    """Return one cause of the catalogue."""
-    for cause in catalogue():
+def by_name(name: str, own: Sequence[Cause] = ()) -> Cause:
+    """Return one cause of the catalogue, or of a plant's own ones."""
+    every = (*catalogue(), *own)
+    for cause in every:
         if cause.name == name:
             return cause
-    raise ValueError(f"no cause named {name!r}{near(name, [c.name for c in catalogue()])}")
+    raise ValueError(f"no cause named {name!r}{near(name, [c.name for c in every])}")
 
 
-def selected(given: Sequence[Cause | str] | None = None) -> tuple[Cause, ...]:
-    """Return the given causes, with names looked up; the whole catalogue by default."""
+def selected(
+    given: Sequence[Cause | str] | None = None, own: Sequence[Cause] = ()
+) -> tuple[Cause, ...]:
+    """Return the given causes, with names looked up; the whole catalogue by default.
+
+    ``own`` are further causes, of one kind of plant.
+    """
     if given is None:
-        return catalogue()
+        return (*catalogue(), *own)
     if isinstance(given, str):
         raise TypeError(f"causes is {given!r}; give a list of causes or names")
     made: list[Cause] = []
     for one in given:
-        cause = by_name(one) if isinstance(one, str) else one
+        cause = by_name(one, own) if isinstance(one, str) else one
         if not isinstance(cause, Cause):
             raise TypeError(f"causes holds {one!r}; give a Cause or the name of one")
         if cause.name in {c.name for c in made}:
