@@ -107,7 +107,7 @@ def diagnose(
     started = clock.perf_counter()
     rule, sheet = rule or Rule(), rig or Rig()
     kind = kind_of(plant, sheet, declared=rig is not None)
-    wanted = selected(causes, kind.own)
+    wanted = selected(causes, kind.catalogue)
     asked = kind.causes(wanted)
     absent = [cause.name for cause in wanted if cause.name not in {c.name for c in asked}]
     with fit_failures_explained(), steps(progress) as step:

@@ -160,8 +160,8 @@ class Kind(Protocol):
         """Outputs that a recording may hold; one is enough."""
 
     @property
-    def own(self) -> tuple[Cause, ...]:
-        """Causes beside those of the catalogue."""
+    def catalogue(self) -> tuple[Cause, ...]:
+        """Causes that are asked for by default."""
 
     @property
     def weighed(self) -> bool:

@@ -12,6 +12,7 @@ from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import Audit, audit_channels
 from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.causes import by_name, catalogue
 from pam_envs.diagnosis.families.adapted import adapted
 from pam_envs.diagnosis.families.compiled import (
     CompiledFamily,
@@ -21,6 +22,7 @@ from pam_envs.diagnosis.families.compiled import (
 )
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration
+from pam_envs.diagnosis.fit.starting_values import grid
 from pam_envs.diagnosis.plant_protocol import Output, Signals
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -52,12 +54,10 @@ KEPT = frozenset(
 FACTORS = {
     ("m", "rad"): 20.0,
     ("m/s", "rad/s"): 20.0,
-    ("N", "N m"): 0.036,
 }
 """Usual sizes of the joint over those of a muscle, by their units: a lever of some centimetres."""
 RENAMED = {"position": "angle", "mass": "link"}
 TITLES = {
-    "stick_slip": "stick-slip in the bearing",
     "creep": "creep of the muscles",
     "sensor_delay": "the delay of the encoder",
 }
@@ -75,6 +75,23 @@ UNEQUAL = Cause(
     needs=("contraction",),
     sensor="a load cell at either muscle",
     compensable=True,
+)
+BREAKS = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
+HOLDS, SPEEDS = (0.45, 0.7), (0.02, 0.1)
+STICKING = dataclasses.replace(
+    by_name("stick_slip"),
+    title="stick-slip in the bearing",
+    forms=(
+        Form(
+            "Stribeck",
+            (
+                Term("link.stick", (0.01,), scale=0.01),
+                Term("link.stick_kinetic", (0.4,), high=0.95, scale=1.0, amount=False),
+                Term("link.stick_speed", (0.05,), high=5.0, log=True, amount=False),
+            ),
+            search=grid(BREAKS, HOLDS, SPEEDS, best=5),
+        ),
+    ),
 )
 PRESSURES = ("pressure_a", "pressure_b")
 SET_POINTS = ("set_point_a", "set_point_b")
@@ -136,7 +153,7 @@ class JointKind:
         Output("pressure_b", 1e3),
         Output("torque", 0.02),
     )
-    own: tuple[Cause, ...] = (UNEQUAL,)
+    catalogue = (*(c for c in catalogue() if c.name != STICKING.name), STICKING, UNEQUAL)
     weighed, experiments = False, False
     loop_reason = "controllers of an antagonistic joint are not compared"
 

@@ -24,7 +24,7 @@ from pam_envs.diagnosis.fit.least_squares import (
     evaluate,
     improve,
 )
-from pam_envs.hysteresis.elements import ELEMENTS
+from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.parameters import Declaration, declarations
 from pam_envs.plants.core.plant import Plant, UnstableParameters
 from pam_envs.plants.core.rollout import BEGIN, run

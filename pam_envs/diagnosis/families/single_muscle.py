@@ -8,7 +8,7 @@ from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import Audit, audit, unmet_needs
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.causes import by_name
+from pam_envs.diagnosis.causes import by_name, catalogue
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration, calibrate
 from pam_envs.diagnosis.fit.least_squares import Free
@@ -63,7 +63,7 @@ class MuscleKind:
         Output(*pair)
         for pair in zip(MuscleFamily.channels, MuscleFamily.fallback_noise, strict=True)
     )
-    own: tuple[Cause, ...] = ()
+    catalogue = catalogue()
     weighed, experiments, loop_reason = True, True, ""
 
     def start(self, sheet: Rig) -> SingleMuscle:
