@@ -10,8 +10,10 @@
     repeats: [[holds_a, holds_b]] # segments that repeat one another
     valve_closed: [shut]          # segments during which the valve is shut
     tolerance: {mass.load: 0.02}  # relative tolerance of known parameters
+    parameters: {link.length: 0.3} # known parameters of the plant [SI]
 
-Every key but ``plant`` may be missing.
+Every key but ``plant`` may be missing. The noise of other plants' sensors is declared under the
+name of the column (``angle_noise_deg`` of ``angle_deg``).
 """
 
 import dataclasses
@@ -24,6 +26,7 @@ from typing import Any, Literal, NamedTuple, get_args
 
 from pam_envs import yaml_file
 from pam_envs.constants import BAR, MM
+from pam_envs.data.recording.channels import WIRINGS
 from pam_envs.wording import near, shown
 
 Load = Literal["hanging_mass", "constant_force"]
@@ -55,7 +58,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
     "history": ("cycles_since_rest", "rezeroed", "settled"),
     "clock": ("tolerance_ms",),
 }
-KEYS = ("plant", *SECTIONS, "load", "repeats", "valve_closed", "tolerance")
+KEYS = ("plant", *SECTIONS, "load", "repeats", "valve_closed", "tolerance", "parameters")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,6 +92,10 @@ class Rig:
         Segments during which the valve is shut, so that the command has no effect.
     tolerance : mapping of str to float
         Plant parameters that are known, with the relative error within which they are.
+    noise : mapping of str to float
+        RMS of the noise of other plants' outputs, by channel [SI].
+    parameters : mapping of str to float
+        Known parameters of the plant, by dotted name [SI]; they start its fit.
     source : str
         Origin of the values.
     """
@@ -107,6 +114,8 @@ class Rig:
     repeats: tuple[tuple[str, ...], ...] = ()
     valve_closed: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    noise: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    parameters: Mapping[str, float] = dataclasses.field(default_factory=dict)
     source: str = dataclasses.field(default="arguments", compare=False)
 
     @property
@@ -114,6 +123,9 @@ class Rig:
         """Sixteen hexadecimal digits that change with any value."""
         values = {k: v for k, v in vars(self).items() if k != "source"}
         values["tolerance"] = dict(self.tolerance)
+        for name in ("noise", "parameters"):  # they leave the digests of other files alone
+            given = dict(values.pop(name))
+            values |= {name: given} if given else {}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
     def __post_init__(self) -> None:
@@ -146,6 +158,11 @@ class Rig:
             )
         for label, times in named.items():
             _require(times == 1, f"repeats names the segment {shown(label)} twice; name it once")
+        for name, value in self.noise.items():
+            _require(
+                value > 0.0,
+                f"the noise of {name} is {value:g}; give its RMS, above 0, or leave it out",
+            )
         for name, value in self.tolerance.items():
             _require(
                 name.count(".") == 1,
@@ -178,8 +195,11 @@ class Rig:
 def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments of :class:`Rig`, in SI."""
     _refuse_unknown(data, KEYS, "")
-    sections = {name: _section(data.get(name), name, keys) for name, keys in SECTIONS.items()}
     plant = data.get("plant")
+    wiring = WIRINGS.get(str(plant).strip())
+    noises = {c.noise_key: c for c in wiring.outputs} if wiring else {}
+    known = SECTIONS | ({"sensors": tuple(noises)} if wiring else {})
+    sections = {name: _section(data.get(name), name, keys) for name, keys in known.items()}
     _require(
         isinstance(plant, str) and bool(plant.strip()),
         f"plant is {shown(plant)}; name the plant's family, for example plant: single_muscle",
@@ -190,6 +210,12 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
         if sections[section].get(key) is not None:
             number = _number(sections[section][key], bounds.key, bounds.unit)
             given[field] = number * bounds.scale
+    given["noise"] = {
+        noises[key].name: _number(value, f"sensors.{key}", noises[key].unit) * noises[key].scale
+        for key, value in sections["sensors"].items()
+        if key in noises and value is not None
+    }
+    given["parameters"] = _parameters(data.get("parameters"))
     if data.get("load") is not None:
         given["load"] = data["load"]
     given |= _history(sections["history"])
@@ -253,6 +279,15 @@ def _repeats(value: Any) -> tuple[tuple[str, ...], ...]:
         f"{shown(value)}",
     )
     return tuple(_labels(group, "each group of repeats") for group in value or [])
+
+
+def _parameters(value: Any) -> dict[str, float]:
+    _require(
+        value is None or isinstance(value, Mapping),
+        "parameters must be a mapping from parameter to value in SI, for example "
+        f"{{link.length: 0.3}}, got {shown(value)}",
+    )
+    return {str(k): _number(v, f"parameters.{k}", "SI") for k, v in (value or {}).items()}
 
 
 def _tolerance(value: Any) -> dict[str, float]:
