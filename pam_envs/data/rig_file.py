@@ -10,6 +10,7 @@
     repeats: [[holds_a, holds_b]] # segments that repeat one another
     valve_closed: [shut]          # segments during which the valve is shut
     tolerance: {mass.load: 0.02}  # relative tolerance of known parameters
+    channels: {pressure_bar: {from: AI/pressure, unit: kPa}}  # of a log file, by column
 
 Every key but ``plant`` may be missing.
 """
@@ -24,6 +25,7 @@ from typing import Any, Literal, NamedTuple, get_args
 
 from pam_envs import yaml_file
 from pam_envs.constants import BAR, MM
+from pam_envs.data.channels import Channel, channels_of
 from pam_envs.wording import near, shown
 
 Load = Literal["hanging_mass", "constant_force"]
@@ -55,7 +57,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
     "history": ("cycles_since_rest", "rezeroed", "settled"),
     "clock": ("tolerance_ms",),
 }
-KEYS = ("plant", *SECTIONS, "load", "repeats", "valve_closed", "tolerance")
+KEYS = ("plant", *SECTIONS, "load", "repeats", "valve_closed", "tolerance", "channels")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,6 +91,8 @@ class Rig:
         Segments during which the valve is shut, so that the command has no effect.
     tolerance : mapping of str to float
         Plant parameters that are known, with the relative error within which they are.
+    channels : mapping of str to Channel
+        Channels of the recording's file, by column; empty if the file has these columns itself.
     source : str
         Origin of the values.
     """
@@ -107,12 +111,13 @@ class Rig:
     repeats: tuple[tuple[str, ...], ...] = ()
     valve_closed: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    channels: Mapping[str, Channel] = dataclasses.field(default_factory=dict)
     source: str = dataclasses.field(default="arguments", compare=False)
 
     @property
     def digest(self) -> str:
-        """Sixteen hexadecimal digits that change with any value."""
-        values = {k: v for k, v in vars(self).items() if k != "source"}
+        """Sixteen hexadecimal digits that change with any value, except where columns are read."""
+        values = {k: v for k, v in vars(self).items() if k not in ("source", "channels")}
         values["tolerance"] = dict(self.tolerance)
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -196,6 +201,7 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
     given["repeats"] = _repeats(data.get("repeats"))
     given["valve_closed"] = _labels(data.get("valve_closed"), "valve_closed")
     given["tolerance"] = _tolerance(data.get("tolerance"))
+    given["channels"] = channels_of(data.get("channels"))
     return given
 
 

@@ -27,6 +27,7 @@ from pam_envs.data.recording.columns import (
     refuse,
     rows_text,
 )
+from pam_envs.data.recording.formats.mapped import is_log, read_mapped
 from pam_envs.data.rig_file import Rig
 from pam_envs.data.tables import READINGS, ContractionTable, load_readings
 from pam_envs.wording import near
@@ -224,12 +225,13 @@ class Recording:
 
 
 def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
-    """Read a recording from a CSV file, put on even steps.
+    """Read a recording from a CSV file or a log file, put on even steps.
 
     Parameters
     ----------
     path : str or Path
-        Columns as in ``docs/recording.md``, in any order.
+        Columns as in ``docs/recording.md``, in any order; or a file whose channels the rig maps to
+        these columns (``docs/formats.md``).
     rig : Rig, optional
         Names the segments with the valve shut, which must exist.
 
@@ -238,7 +240,7 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
     RecordingError
         With all problems, naming column, rows and remedy.
     """
-    sheet = read_sheet(path, COLUMNS, REQUIRED, "a recording")
+    sheet = _sheet(path, rig)
     if not {"pressure_bar", "contraction_mm"} & set(sheet.cells):
         text = "give at least one of the columns pressure_bar and contraction_mm"
         if "force_N" in sheet.cells:
@@ -259,10 +261,20 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
 
 def read_input(path: str | Path, rig: Rig | None = None) -> Recording | ContractionTable:
     """Read a recording or a table of settled readings, according to its columns."""
+    if is_log(path) or (rig is not None and rig.channels):
+        return load_recording(path, rig)
     header = set(read_header(path))
     if header & set(READINGS) and not header & (set(COLUMNS) - set(READINGS)):
         return load_readings(path)
     return load_recording(path, rig)
+
+
+def _sheet(path: str | Path, rig: Rig | None) -> Sheet:
+    """Return the columns of a recording, mapped by the rig if it maps any."""
+    channels = {} if rig is None else rig.channels
+    if channels or is_log(path):
+        return read_mapped(path, channels, COLUMNS, REQUIRED, "a recording")
+    return read_sheet(path, COLUMNS, REQUIRED, "a recording")
 
 
 def _columns(sheet: Sheet) -> tuple[dict[str, Array], list[str]]:
