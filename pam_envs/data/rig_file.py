@@ -25,7 +25,7 @@ from typing import Any, Literal, NamedTuple, get_args
 
 from pam_envs import yaml_file
 from pam_envs.constants import BAR, MM
-from pam_envs.data.channels import Channel, channels_of
+from pam_envs.data.channel_sources import ChannelSource, sources_of
 from pam_envs.wording import near, shown
 
 Load = Literal["hanging_mass", "constant_force"]
@@ -91,7 +91,7 @@ class Rig:
         Segments during which the valve is shut, so that the command has no effect.
     tolerance : mapping of str to float
         Plant parameters that are known, with the relative error within which they are.
-    channels : mapping of str to Channel
+    channels : mapping of str to ChannelSource
         Channels of the recording's file, by column; empty if the file has these columns itself.
     source : str
         Origin of the values.
@@ -111,7 +111,7 @@ class Rig:
     repeats: tuple[tuple[str, ...], ...] = ()
     valve_closed: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    channels: Mapping[str, Channel] = dataclasses.field(default_factory=dict)
+    channels: Mapping[str, ChannelSource] = dataclasses.field(default_factory=dict)
     source: str = dataclasses.field(default="arguments", compare=False)
 
     @property
@@ -201,7 +201,7 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
     given["repeats"] = _repeats(data.get("repeats"))
     given["valve_closed"] = _labels(data.get("valve_closed"), "valve_closed")
     given["tolerance"] = _tolerance(data.get("tolerance"))
-    given["channels"] = channels_of(data.get("channels"))
+    given["channels"] = sources_of(data.get("channels"))
     return given
 
 

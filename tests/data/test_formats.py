@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pam_envs.data.channels import Channel
+from pam_envs.data.channel_sources import ChannelSource
 from pam_envs.data.recording.formats import matlab, signals
 from pam_envs.data.recording.formats.units import UNITS, conversion, unit_of
 from pam_envs.data.recording.recording import Recording, RecordingError, load_recording, read_input
@@ -24,9 +24,9 @@ LABELS = ["a"] * (N // 2) + ["b"] * (N - N // 2)
 
 def rig(**channels: object) -> Rig:
     """Return a rig with a mapping of channels, as RIG.yaml gives it."""
-    from pam_envs.data.channels import channels_of
+    from pam_envs.data.channel_sources import sources_of
 
-    return Rig(channels=channels_of(channels))
+    return Rig(channels=sources_of(channels))
 
 
 def refusal(path: Path, sheet: Rig | None) -> str:
@@ -473,9 +473,9 @@ def test_channels_of_a_rig_file_are_read(tmp_path):
     )
     got = Rig.from_yaml(path)
     assert got.channels == {
-        "pressure_bar": Channel("AI/p"),
-        "contraction_mm": Channel("AI/x", "m", -2e-3, 1.0),
-        "load_N": Channel("", "kg", value=2.5),
+        "pressure_bar": ChannelSource("AI/p"),
+        "contraction_mm": ChannelSource("AI/x", "m", -2e-3, 1.0),
+        "load_N": ChannelSource("", "kg", value=2.5),
     }
     assert got.digest == Rig().digest  # where columns are read is no property of the rig
 

@@ -23,11 +23,10 @@ from pam_envs.data.recording.columns import (
     RecordingError,
     Sheet,
     read_header,
-    read_sheet,
     refuse,
     rows_text,
 )
-from pam_envs.data.recording.formats.mapped import is_log, read_mapped
+from pam_envs.data.recording.formats.mapped import is_log, sheet_of
 from pam_envs.data.rig_file import Rig
 from pam_envs.data.tables import READINGS, ContractionTable, load_readings
 from pam_envs.wording import near
@@ -240,7 +239,7 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
     RecordingError
         With all problems, naming column, rows and remedy.
     """
-    sheet = _sheet(path, rig)
+    sheet = sheet_of(path, rig.channels if rig else {}, COLUMNS, REQUIRED, "a recording")
     if not {"pressure_bar", "contraction_mm"} & set(sheet.cells):
         text = "give at least one of the columns pressure_bar and contraction_mm"
         if "force_N" in sheet.cells:
@@ -267,14 +266,6 @@ def read_input(path: str | Path, rig: Rig | None = None) -> Recording | Contract
     if header & set(READINGS) and not header & (set(COLUMNS) - set(READINGS)):
         return load_readings(path)
     return load_recording(path, rig)
-
-
-def _sheet(path: str | Path, rig: Rig | None) -> Sheet:
-    """Return the columns of a recording, mapped by the rig if it maps any."""
-    channels = {} if rig is None else rig.channels
-    if channels or is_log(path):
-        return read_mapped(path, channels, COLUMNS, REQUIRED, "a recording")
-    return read_sheet(path, COLUMNS, REQUIRED, "a recording")
 
 
 def _columns(sheet: Sheet) -> tuple[dict[str, Array], list[str]]:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.arrays import Array
-from pam_envs.data.channels import Channel
+from pam_envs.data.channel_sources import ChannelSource
 from pam_envs.data.recording.clock import GAP
-from pam_envs.data.recording.columns import Sheet, column_hint, refuse
+from pam_envs.data.recording.columns import Sheet, column_hint, read_sheet, refuse
 from pam_envs.data.recording.formats.hdf5 import open_hdf5
 from pam_envs.data.recording.formats.matlab import open_matlab
 from pam_envs.data.recording.formats.ros2 import open_bag
@@ -40,7 +40,7 @@ OPENERS: dict[str, Callable[[Path], AbstractContextManager[Log]]] = {
 }
 """Readers by the suffix of a file; a folder is a bag of ROS 2."""
 TIME = "time_s"
-HELD = ("segment", "load_N")
+HELD = ("segment", "load_N", "payload_kg")
 """Columns that hold their value between two samples, as all commands do."""
 LABELS = "segment"
 
@@ -52,9 +52,28 @@ def is_log(path: str | Path) -> bool:
     return where.is_dir() or opener not in (None, open_table)
 
 
+def sheet_of(
+    path: str | Path,
+    sources: Mapping[str, ChannelSource],
+    columns: Sequence[str],
+    required: Sequence[str],
+    what: str,
+) -> Sheet:
+    """Read the columns of a file: those of a CSV file itself, or those mapped by ``sources``.
+
+    Raises
+    ------
+    RecordingError
+        As :func:`read_mapped` and :func:`pam_envs.data.recording.columns.read_sheet`.
+    """
+    if sources or is_log(path):
+        return read_mapped(path, sources, columns, required, what)
+    return read_sheet(path, columns, required, what)
+
+
 def read_mapped(
     path: str | Path,
-    channels: Mapping[str, Channel],
+    channels: Mapping[str, ChannelSource],
     columns: Sequence[str],
     required: Sequence[str],
     what: str,
@@ -105,7 +124,7 @@ def read_mapped(
     return Sheet(str(path), cells, np.arange(2, len(time) + 2, dtype=np.int64))
 
 
-def _signal(log: Log, name: str, channel: Channel) -> Signal:
+def _signal(log: Log, name: str, channel: ChannelSource) -> Signal:
     """Return the readings of a column in its unit."""
     found = log.read(channel.source) if channel.source else Signal(np.array([channel.value]))
     if not len(found.values):
@@ -119,7 +138,7 @@ def _signal(log: Log, name: str, channel: Channel) -> Signal:
     return Signal(factor * readings + shift, "", found.time)
 
 
-def converted(name: str, channel: Channel, stated: str) -> tuple[float, float]:
+def converted(name: str, channel: ChannelSource, stated: str) -> tuple[float, float]:
     """Return factor and shift from readings to the unit of a column.
 
     The unit is that of RIG.yaml, that which the file states, or that of the column. A unit of the

@@ -35,7 +35,7 @@ class Signal:
     Attributes
     ----------
     values : ndarray, shape (n,)
-        Numbers, or words.
+        Readings [unit of the file], or words.
     unit : str
         Unit that the file states; empty without one.
     time : ndarray of float or None, shape (n,)

@@ -23,7 +23,7 @@ MOST = 100
 
 
 @dataclasses.dataclass(frozen=True)
-class Channel:
+class ChannelSource:
     """Source of one column of a recording.
 
     Attributes
@@ -52,7 +52,7 @@ class Channel:
         return (self.scale, self.offset) != (1.0, 0.0)
 
 
-def channels_of(given: Any) -> dict[str, Channel]:
+def sources_of(given: Any) -> dict[str, ChannelSource]:
     """Return the channels of a section of RIG.yaml, by column.
 
     Raises
@@ -72,9 +72,9 @@ def channels_of(given: Any) -> dict[str, Channel]:
     return {str(column): _channel(f"channels.{column}", entry) for column, entry in given.items()}
 
 
-def _channel(key: str, entry: Any) -> Channel:
+def _channel(key: str, entry: Any) -> ChannelSource:
     if isinstance(entry, str) and entry.strip():
-        return Channel(entry.strip())
+        return ChannelSource(entry.strip())
     if not isinstance(entry, Mapping):
         raise ValueError(
             f"{key} must be the name of a channel or a mapping with the keys {', '.join(KEYS)}, "
@@ -96,7 +96,7 @@ def _channel(key: str, entry: Any) -> Channel:
         raise ValueError(f"{key}.scale is 0; give the reading per number in the file")
     if "value" in numbers and len(numbers) > 1:
         raise ValueError(f"{key} has value together with scale or offset; give value alone")
-    return Channel(text["from"], text["unit"], **numbers)
+    return ChannelSource(text["from"], text["unit"], **numbers)
 
 
 def _number(key: str, given: Any) -> float:
