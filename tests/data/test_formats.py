@@ -367,7 +367,7 @@ def test_lost_messages_leave_empty_cells(tmp_path):
     from pam_envs.data.recording.formats.mapped import on_one_clock
 
     late = np.delete(TIME, slice(50, 60))
-    time, columns = on_one_clock(
+    columns = on_one_clock(
         {
             "contraction_mm": signals.Signal(CONTRACTION, "", TIME),
             "pressure_bar": signals.Signal(np.delete(PRESSURE, slice(50, 60)), "", late),
@@ -376,7 +376,7 @@ def test_lost_messages_leave_empty_cells(tmp_path):
     )
     assert np.flatnonzero(np.isnan(columns["pressure_bar"])).tolist() == list(range(50, 60))
     assert (columns["pressure_command_bar"][50:60] == COMMAND[49]).all()
-    np.testing.assert_allclose(time, TIME)
+    np.testing.assert_allclose(columns["time_s"], TIME)
 
 
 def test_clocks_must_overlap_and_increase():

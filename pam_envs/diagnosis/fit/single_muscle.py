@@ -51,6 +51,11 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
 }
 """Base parameters with the settings of their fits that differ from the declarations."""
+WITHIN = {"mass.moving_mass": (0.05, 0.2, 5.0, 20.0), "mass.damping": (10.0, 0.04, 1e4, 40.0)}
+"""Largest lower bound [SI] and its share of the start, least upper bound and its factor."""
+LEAST_SCALE = 0.01
+"""Least scale over the start, for forces of large muscles."""
+FORCES = ("muscle.braid_force", "muscle.stiffness", "muscle.softening", "muscle.hardening")
 ORIFICES = {
     "regulator.conductance": 3e-10,
     "regulator.exhaust_share": 1.0,
@@ -215,9 +220,16 @@ class MuscleFamily:
         d, value = declared(self.plant, name), self.plant.value(name)
         made = dict(low=d.low, high=d.high, start=value)
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
+        if name in WITHIN:
+            low, share, high, factor = WITHIN[name]
+            made |= dict(low=max(d.low, min(low, share * value)))
+            made |= dict(high=min(d.high, max(high, factor * value)))
         if name == SOURCE:  # a muscle is filled from above its largest setpoint
             made["low"] = max(d.low, LEAST_SOURCE * self.plant.regulator.max_pressure)
-        return Free(name, R.place(name), **{**made, **SETTINGS.get(name, {}), **changes})
+        made |= SETTINGS.get(name, {})
+        if name in FORCES:
+            made["scale"] = max(made["scale"], LEAST_SCALE * abs(value))
+        return Free(name, R.place(name), **{**made, **changes})
 
     def base(self) -> tuple[Free, ...]:
         """Return the base parameters, with those of effects that the plant already has."""

@@ -116,12 +116,12 @@ def read_mapped(
             refuse(str(path), *problems)
         constants = {n: signals.pop(n) for n in [*signals] if not channels[n].source}
         try:
-            time, values = on_one_clock(signals)
+            cells = on_one_clock(signals) if TIME in columns else in_rows(signals)
         except ChannelError as error:
             refuse(str(path), str(error))
-    cells: dict[str, NDArray[Any]] = {TIME: time, **values}
-    cells |= {name: np.full(len(time), s.values[0]) for name, s in constants.items()}
-    return Sheet(str(path), cells, np.arange(2, len(time) + 2, dtype=np.int64))
+    n = len(next(iter(cells.values())))
+    cells |= {name: np.full(n, signal.values[0]) for name, signal in constants.items()}
+    return Sheet(str(path), cells, np.arange(2, n + 2, dtype=np.int64))
 
 
 def _signal(log: Log, name: str, channel: ChannelSource) -> Signal:
@@ -172,7 +172,21 @@ def converted(name: str, channel: ChannelSource, stated: str) -> tuple[float, fl
     return conversion(given, target)
 
 
-def on_one_clock(signals: Mapping[str, Signal]) -> tuple[Array, dict[str, NDArray[Any]]]:
+def in_rows(signals: Mapping[str, Signal]) -> dict[str, NDArray[Any]]:
+    """Return the columns of a table without time, which need equally many values."""
+    if not signals:
+        raise ChannelError("every column is a constant; map a measured column")
+    first = next(iter(signals))
+    for name, signal in signals.items():
+        if len(signal.values) != len(signals[first].values):
+            raise ChannelError(
+                f"{name} has {len(signal.values)} values, {first} has "
+                f"{len(signals[first].values)}; map channels of the same rows"
+            )
+    return {name: signal.values for name, signal in signals.items()}
+
+
+def on_one_clock(signals: Mapping[str, Signal]) -> dict[str, NDArray[Any]]:
     """Return the time [s] and all columns on it.
 
     The clock is a mapped time, for columns with as many values; otherwise that of the first column
@@ -187,7 +201,7 @@ def on_one_clock(signals: Mapping[str, Signal]) -> tuple[Array, dict[str, NDArra
                     f"{name} has {len(signal.values)} values, {TIME} has {len(time)}; map channels "
                     "of one clock, or leave time_s out if each channel has a clock of its own"
                 )
-        return time, {n: s.values for n, s in signals.items() if n != TIME}
+        return {name: signal.values for name, signal in signals.items()}
     for name, signal in signals.items():
         if signal.time is None:
             raise ChannelError(f"{name} has no clock of its own; map {TIME} to a channel")
@@ -204,7 +218,7 @@ def on_one_clock(signals: Mapping[str, Signal]) -> tuple[Array, dict[str, NDArra
         spans = ", ".join(f"{n} from {c[0]:.6g} to {c[-1]:.6g} s" for n, c in clocks.items())
         raise ChannelError(f"the clocks of the channels do not overlap ({spans}); record together")
     made = {name: _resampled(name, s.values, clocks[name], time) for name, s in signals.items()}
-    return time - time[0], made
+    return {TIME: time - time[0], **made}
 
 
 def held(name: str) -> bool:
