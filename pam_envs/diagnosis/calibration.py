@@ -25,6 +25,7 @@ from pam_envs.diagnosis.decide.verdict import Decision
 from pam_envs.diagnosis.diagnosis import Study, fit_failures_explained
 from pam_envs.diagnosis.fit.intervals import at_bound
 from pam_envs.diagnosis.fit.least_squares import Free
+from pam_envs.diagnosis.fit.similarity import NO_FLOW, Similarity
 from pam_envs.diagnosis.fit.single_muscle import (
     PLAIN_NEUTRAL,
     THRESHOLDS,
@@ -44,6 +45,8 @@ DEAD_TIME = 0.03
 """Starting value of the dead time [s], which the fit moves."""
 SHARE = 0.7
 """Share of the hysteresis in the start's slope."""
+SAME = 1.01
+"""Ratio of errors up to which the first family is taken."""
 CALIBRATED = "pam-envs calibrate"
 DISPLAY = {"contraction": ("mm", 1e-3), "pressure": ("bar", 1e5)}
 WIDTH = 100
@@ -170,12 +173,16 @@ def calibrate(
             )
         # a plant file holds no clock: an offset is part of the dead time unless a limit is declared
         sheet = dataclasses.replace(rig, clock_tolerance=rig.clock_tolerance or 0.0)
-        floor = noise_floor(recording, sheet)
         family = ""
         if plant is None:
             family, plant = nearest(recording, sheet)
+        similar = Similarity.of(plant)
+        alike, rig_alike = similar.recording(recording), similar.rig(sheet)
+        begin = similar.plant(plant)
+        if similar.pressure != 1.0:
+            begin = begin.replace(NO_FLOW)
         step("refitting the plant")
-        study = Study.begin(recording, sheet, plant, floor)
+        study = Study.begin(alike, rig_alike, begin, noise_floor(alike, rig_alike))
         step("differences from the plain plant")
         study.make_flexible(catalogue())
         study.seed, study.decision = seed, Decision("adequate", study.normal)
@@ -183,20 +190,21 @@ def calibrate(
         study.hold_out()
     found = study.normal
     source = f"{CALIBRATED}, recording {recording.digest[:12]}"
-    made = identified(study.plant_of(found), found.fit.frees, source)
+    fitted = similar.inverse.plant(study.plant_of(found))
+    made = identified(fitted, found.fit.frees, source)
     load = {"mass.load": float(np.median(recording.load)) / GRAVITY}
     loaded = made.replace(load)
     loads = {"mass.load": ("assumed", f"median of the recording, {source}")}
     loaded = dataclasses.replace(loaded, provenance={**loaded.provenance, **loads})
-    bounds = dict(_bounds(loaded, found.fit.frees, found.fit.values()))
+    bounds = dict(_bounds(loaded, found.fit.frees, found.fit.values(), similar.inverse))
     return BasePlant(
         plant=loaded,
         family=family,
-        errors=_errors(study, plant),
+        errors=_errors(study, begin, similar.inverse),
         differences=found.names,
         at_bound=tuple(text for text in bounds.values() if text),
         off=tuple(name for name, text in bounds.items() if not text),
-        warnings=tuple(dict.fromkeys((*checked.warnings, *floor.warnings))),
+        warnings=tuple(dict.fromkeys(checked.warnings)),
     )
 
 
@@ -213,7 +221,8 @@ def calibrate_forces(table: ForceTable, rig: Rig) -> BasePlant:
     for family in (rig.family,) if rig.family else FAMILIES:
         plant = sized(family, rig, max_pressure=full)
         fits.append((family, plant, fit_law(table, plant.muscle)))
-    family, plant, fit = min(fits, key=lambda found: found[2].rms)
+    enough = SAME * min(fit.rms for _, _, fit in fits)
+    family, plant, fit = next(found for found in fits if found[2].rms <= enough)
     values = {f"muscle.{name}": value for name, value in fit.values.items()}
     made = plant.replace({**values, "muscle.area_curve": 0.0})
     sources = dict.fromkeys(values, ("identified", f"{CALIBRATED}, {Path(table.source).name}"))
@@ -276,8 +285,9 @@ def nearest(recording: Recording, rig: Rig) -> tuple[str, SingleMuscle]:
     return best, starts[best]
 
 
-def _errors(study: Study, plant: SingleMuscle) -> dict[str, Errors]:
+def _errors(study: Study, plant: SingleMuscle, original: Similarity) -> dict[str, Errors]:
     """Return the RMS errors by channel, zero offsets and settling removed."""
+    scales = {"contraction": 1.0, "pressure": original.pressure}
     problem, held = study.problem, study.held
     assert held is not None
     column = np.append(plant.parameter_rows(), 0.0)
@@ -289,11 +299,13 @@ def _errors(study: Study, plant: SingleMuscle) -> dict[str, Errors]:
         if not np.isfinite(problem.measured[k]).any():
             continue
         floor, source = study.floor_of(channel)
+        scale = scales[channel]
+        unseen = ~(held.rows & np.isfinite(problem.measured[k]))
         found[channel] = Errors(
-            _rms(before[k] - problem.measured[k]),
-            _rms(after[k] - problem.measured[k]),
-            _rms(np.where(held.rows & np.isfinite(problem.measured[k]), left[k], np.nan)),
-            floor,
+            scale * _rms(before[k] - problem.measured[k]),
+            scale * _rms(after[k] - problem.measured[k]),
+            scale * _rms(np.where(unseen, np.nan, left[k])),
+            scale * floor,
             source,
         )
     return found
@@ -304,7 +316,7 @@ def _rms(values: Array) -> float:
 
 
 def _bounds(
-    plant: SingleMuscle, frees: Sequence[Free], values: Mapping[str, float]
+    plant: SingleMuscle, frees: Sequence[Free], values: Mapping[str, float], original: Similarity
 ) -> Iterator[tuple[str, str]]:
     """Yield the parameters at a bound with a sentence, which is empty at a neutral value."""
     for free in frees:
@@ -312,7 +324,8 @@ def _bounds(
         weight = free.name.startswith("hysteresis.weight")
         off = 0.0 if weight or free.name == "regulator.dead_time" else plant.neutral.get(free.name)
         if at_bound(free, value) and not (weight and value == 0.0):
-            text = _at_bound(free.name, value, free.low, free.high, unit_of(plant, free.name))
+            f, unit = original.factor_of(plant, free.name), unit_of(plant, free.name)
+            text = _at_bound(free.name, f * value, f * free.low, f * free.high, unit)
             yield free.name, "" if value == off else text
 
 

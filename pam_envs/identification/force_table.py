@@ -65,6 +65,7 @@ def fit_law(table: ForceTable, muscle: EffectiveAreaMuscle) -> LawFit:
         )
     best = min(found, key=lambda fit: float(fit.cost))
     values = np.clip(best.x * scale, low, high)
+    values = np.where(best.active_mask < 0, low, np.where(best.active_mask > 0, high, values))
     at_bound = tuple(n for n, active in zip(FITTED, best.active_mask, strict=True) if active)
     left = errors(best.x)
     return LawFit(
