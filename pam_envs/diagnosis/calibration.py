@@ -28,6 +28,7 @@ from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.similarity import NO_FLOW, Similarity
 from pam_envs.diagnosis.fit.single_muscle import (
     PLAIN_NEUTRAL,
+    SWITCHED_OFF,
     THRESHOLDS,
     identified,
     inputs_of,
@@ -47,6 +48,8 @@ SHARE = 0.7
 """Share of the hysteresis in the start's slope."""
 SAME = 1.01
 """Ratio of errors up to which the first family is taken."""
+LEAST_WEIGHT = 1e-6
+"""Weight of an element of friction below which it is not used."""
 CALIBRATED = "pam-envs calibrate"
 DISPLAY = {"contraction": ("mm", 1e-3), "pressure": ("bar", 1e5)}
 WIDTH = 100
@@ -322,11 +325,10 @@ def _bounds(
     for free in frees:
         value = values[free.name]
         weight = free.name.startswith("hysteresis.weight")
-        off = 0.0 if weight or free.name == "regulator.dead_time" else plant.neutral.get(free.name)
-        if at_bound(free, value) and not (weight and value == 0.0):
+        if at_bound(free, value) and not (weight and value < LEAST_WEIGHT):
             f, unit = original.factor_of(plant, free.name), unit_of(plant, free.name)
             text = _at_bound(free.name, f * value, f * free.low, f * free.high, unit)
-            yield free.name, "" if value == off else text
+            yield free.name, "" if value == SWITCHED_OFF.get(free.name) else text
 
 
 def _at_bound(name: str, value: float, low: float, high: float, unit: str) -> str:

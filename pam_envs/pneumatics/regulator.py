@@ -162,7 +162,7 @@ def usual_dead_time() -> float:
 def usual_slew_rate() -> float:
     """Return the slew rate of a regulator that was measured, for regulators of its class."""
     return assumed(
-        6.8e5, "Pa/s", 1e4, 1e9, "DMSP-10-250 record, raw step", neutral=1e9, spread=(4e5, 1.2e6)
+        6.8e5, "Pa/s", 1e2, 1e9, "DMSP-10-250 record, raw step", neutral=1e9, spread=(4e5, 1.2e6)
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.fit.single_muscle import FINER, declared
+from pam_envs.diagnosis.fit.single_muscle import FINER, SWITCHED_OFF, declared
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.plants.core.plant import UnstableParameters
 from pam_envs.plants.single_muscle import rows as R
@@ -76,10 +76,16 @@ class Similarity:
 
     def plant(self, plant: SingleMuscle) -> SingleMuscle:
         """Return the similar plant, with as many sub-steps as it needs."""
+        off = {
+            name
+            for group in plant.effects
+            if all(plant.value(n) == plant.neutral.get(n, plant.value(n)) for n in group)
+            for name in group
+        }
         values: dict[str, Any] = {
             name: plant.value(name) * self.factor_of(plant, name)
             for name in R.NAMES
-            if plant.value(name) != plant.neutral.get(name)
+            if name not in off and plant.value(name) != SWITCHED_OFF.get(name)
         }
         operator = plant.hysteresis.operator
         if isinstance(operator, PlayOperator):
