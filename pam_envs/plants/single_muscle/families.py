@@ -84,6 +84,7 @@ def base_plant(
         "hysteresis.operator": PlayOperator(
             tuple(rated * t for t in operator.thresholds), operator.weights, operator.linear
         ),
+        "hysteresis.width_per_load": 0.0,
         "mass.load": load,
         "mass.moving_mass": stock.mass.moving_mass * wide,
         "mass.damping": stock.mass.damping * wide,
