@@ -8,9 +8,6 @@ second form one element yields smoothly (Bouc and Wen), so that its minor loops 
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
-MOST = 500.0
-"""Largest friction [N]."""
-
 CAUSE = Cause(
     name="hysteresis_drive",
     title="friction that is driven by length",
@@ -18,34 +15,16 @@ CAUSE = Cause(
         Form(
             "strands",
             (
-                *(
-                    Term(f"muscle.strand_{k}", (0.5, 2.0), low=0.0, high=MOST, scale=1.0)
-                    for k in (1, 2, 3, 4)
-                ),
+                *(Term(f"muscle.strand_{k}", (0.5, 2.0), scale=1.0) for k in (1, 2, 3, 4)),
                 Term("muscle.strand_break", (0.02,), log=True, amount=False, prior=1.5),
-                Term(
-                    "muscle.strand_per_pressure",
-                    (0.0,),
-                    low=-2e-6,
-                    high=1e-4,
-                    scale=1e-6,
-                    amount=False,
-                    prior=8.0,
-                ),
+                Term("muscle.strand_per_pressure", (0.0,), scale=1e-6, amount=False, prior=8.0),
             ),
         ),
         Form(
             "yielding",
             (
-                Term("muscle.yield_force", (3.0,), low=0.0, high=MOST, scale=1.0),
-                Term(
-                    "muscle.yield_per_pressure",
-                    (0.0,),
-                    low=-1e-3,
-                    high=1e-3,
-                    scale=1e-5,
-                    amount=False,
-                ),
+                Term("muscle.yield_force", (3.0,), scale=1.0),
+                Term("muscle.yield_per_pressure", (0.0,), scale=1e-5, amount=False),
                 Term("muscle.yield_break", (0.01, 0.03), log=True, amount=False),
                 Term("muscle.yield_ratio", (0.5,), scale=0.3, amount=False),
             ),

@@ -8,19 +8,13 @@ that the form lacks, as a smooth correction of the force.
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.muscle.effective_area import MAP_SIZES
 
-MOST = 500.0
-"""Largest force of a term [N]."""
-
 CAUSE = Cause(
     name="static_law",
     title="another shape of the force law",
     forms=(
         Form(
             "map",
-            tuple(
-                Term(f"muscle.{name}", (0.5,), low=-MOST, high=MOST, scale=2.0, prior=10.0)
-                for name in MAP_SIZES
-            ),
+            tuple(Term(f"muscle.{name}", (0.5,), scale=2.0, prior=10.0) for name in MAP_SIZES),
         ),
     ),
     signature="a smooth function of pressure and contraction, independent of direction and time",
