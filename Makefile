@@ -5,7 +5,7 @@ JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-EXTRAS := plot,data,baselines,agents,bench,export,rig,cluster,dev
+EXTRAS := plot,data,formats,baselines,agents,bench,export,rig,cluster,dev
 INSTALL := $(BIN)/python -m pip --disable-pip-version-check --no-input install -qq
 PLAIN := tests/hysteresis tests/kernels tests/plants/test_golden_plants.py $(addprefix tests/envs/, core/test_bits.py core/test_everyday.py core/test_own_family.py test_golden_trajectories.py)
 

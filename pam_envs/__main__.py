@@ -214,6 +214,60 @@ def diagnose(
     print(f"wrote {out}")
 
 
+def calibrate(
+    recording: tyro.conf.Positional[Path],
+    rig: Path,
+    out: Path = Path("plant.yaml"),
+    plant: Path | None = None,
+    seed: int = 0,
+    quiet: bool = False,
+) -> None:
+    """Calibrate a base plant for a muscle from a recording or a table of forces.
+
+    Parameters
+    ----------
+    recording : Path
+        Recording in time, or table of static forces (docs/base_plant.md).
+    rig : Path
+        YAML file with the size of the muscle and other known properties of the rig.
+    out : Path
+        Plant file to write.
+    plant : Path
+        Plant file to start from; default: the family of muscles of the rig file, or the nearest.
+    seed : int
+        Seed of all random draws.
+    quiet : bool
+        Show no progress.
+    """
+    from pam_envs.data.force_table import is_force_table, load_force_table
+    from pam_envs.data.recording.recording import Recording, read_input
+    from pam_envs.data.rig_file import Rig
+    from pam_envs.diagnosis import calibration
+    from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+    declared = Rig.from_yaml(rig)
+    if declared.plant != SingleMuscle.family:
+        raise ValueError(
+            f"plant: {declared.plant!r} cannot be calibrated; there is: {SingleMuscle.family}"
+        )
+    if out.is_dir():
+        raise ValueError(f"{out} is a folder; give the name of the plant file, --out plant.yaml")
+    if is_force_table(recording, declared):
+        found = calibration.calibrate_forces(load_force_table(recording, declared), declared)
+    else:
+        data = read_input(recording, declared)
+        if not isinstance(data, Recording):
+            raise ValueError(
+                f"{recording} is a table of settled readings, which shows no force; give a "
+                "recording in time, or a table of pressure_bar, contraction_mm and force_N"
+            )
+        start = None if plant is None else SingleMuscle.from_yaml(plant)
+        found = calibration.calibrate(data, declared, start, seed=seed, progress=not quiet)
+    found.write(out)
+    print(found.summary())
+    print(f"wrote {out}")
+
+
 def reveal(recording: tyro.conf.Positional[Literal["example"]] = "example") -> None:
     """Print the effect that is hidden in a shipped recording; diagnose it first.
 
@@ -299,6 +353,7 @@ def main(arguments: list[str] | None = None) -> int:
         "render": render,
         "identify": identify,
         "diagnose": diagnose,
+        "calibrate": calibrate,
         "reveal": reveal,
         "export": export,
         "warmup": warmup,

@@ -1,7 +1,7 @@
 """Declared facts of a rig: ``RIG.yaml``.
 
     plant: single_muscle
-    muscle: {rest_length_mm: 200, diameter_mm: 10}
+    muscle: {rest_length_mm: 200, diameter_mm: 10, family: festo_dmsp}
     regulator: {max_pressure_bar: 6}
     load: hanging_mass            # or constant_force
     sensors: {contraction_noise_mm: 0.03, pressure_noise_bar: 0.008}
@@ -11,6 +11,7 @@
     valve_closed: [shut]          # segments during which the valve is shut
     tolerance: {mass.load: 0.02}  # relative tolerance of known parameters
     parameters: {link.length: 0.3} # known parameters of the plant [SI]
+    channels: {pressure_bar: {from: AI/pressure, unit: kPa}}  # of a log file, by column
 
 Every key but ``plant`` may be missing. The noise of other plants' sensors is declared under the
 name of the column (``angle_noise_deg`` of ``angle_deg``).
@@ -19,6 +20,7 @@ name of the column (``angle_noise_deg`` of ``angle_deg``).
 import dataclasses
 import hashlib
 import json
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,10 +28,13 @@ from typing import Any, Literal, NamedTuple, get_args
 
 from pam_envs import yaml_file
 from pam_envs.constants import BAR, MM
+from pam_envs.data.channel_sources import ChannelSource, sources_of
 from pam_envs.data.recording.channels import WIRINGS
 from pam_envs.wording import near, shown
 
 Load = Literal["hanging_mass", "constant_force"]
+MUSCLES = ("festo_mas", "festo_dmsp", "mckibben")
+"""Families of :mod:`pam_envs.plants.single_muscle.families`."""
 
 
 class Bounds(NamedTuple):
@@ -45,20 +50,30 @@ class Bounds(NamedTuple):
 NUMBERS = {
     "rest_length": Bounds("muscle.rest_length_mm", "mm", MM, 10.0, 5000.0),
     "diameter": Bounds("muscle.diameter_mm", "mm", MM, 1.0, 100.0),
-    "max_pressure": Bounds("regulator.max_pressure_bar", "bar", BAR, 0.5, 15.0),
+    "braid_angle": Bounds("muscle.braid_angle_deg", "deg", math.radians(1.0), 12.0, 50.0),
+    "max_pressure": Bounds("regulator.max_pressure_bar", "bar", BAR, 0.1, 30.0),
     "contraction_noise": Bounds("sensors.contraction_noise_mm", "mm", MM, 1e-5, 10.0),
     "pressure_noise": Bounds("sensors.pressure_noise_bar", "bar", BAR, 1e-6, 1.0),
     "clock_tolerance": Bounds("clock.tolerance_ms", "ms", 1e-3, 0.0, 1000.0),
 }
 """Fields of :class:`Rig` that are numbers with a unit."""
 SECTIONS: dict[str, tuple[str, ...]] = {
-    "muscle": ("rest_length_mm", "diameter_mm"),
+    "muscle": ("rest_length_mm", "diameter_mm", "family", "braid_angle_deg"),
     "regulator": ("max_pressure_bar",),
     "sensors": ("contraction_noise_mm", "pressure_noise_bar"),
     "history": ("cycles_since_rest", "rezeroed", "settled"),
     "clock": ("tolerance_ms",),
 }
-KEYS = ("plant", *SECTIONS, "load", "repeats", "valve_closed", "tolerance", "parameters")
+KEYS = (
+    "plant",
+    *SECTIONS,
+    "load",
+    "repeats",
+    "valve_closed",
+    "tolerance",
+    "parameters",
+    "channels",
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,6 +86,11 @@ class Rig:
         Family of the plant to replay the recording through.
     rest_length, diameter : float or None
         Of the muscle [m].
+    family : str
+        Family of the muscle's base plant (:mod:`pam_envs.plants.single_muscle.families`); empty:
+        the one that is nearest to the recording.
+    braid_angle : float or None
+        Angle between threads and axis at rest [rad].
     max_pressure : float or None
         Largest gauge pressure that the regulator gives [Pa].
     load : {"hanging_mass", "constant_force"}
@@ -96,6 +116,8 @@ class Rig:
         RMS of the noise of other plants' outputs, by channel [SI].
     parameters : mapping of str to float
         Known parameters of the plant, by dotted name [SI]; they start its fit.
+    channels : mapping of str to ChannelSource
+        Channels of the recording's file, by column; empty if the file has these columns itself.
     source : str
         Origin of the values.
     """
@@ -103,6 +125,8 @@ class Rig:
     plant: str = "single_muscle"
     rest_length: float | None = None
     diameter: float | None = None
+    family: str = ""
+    braid_angle: float | None = None
     max_pressure: float | None = None
     load: Load = "hanging_mass"
     contraction_noise: float | None = None
@@ -116,12 +140,16 @@ class Rig:
     tolerance: Mapping[str, float] = dataclasses.field(default_factory=dict)
     noise: Mapping[str, float] = dataclasses.field(default_factory=dict)
     parameters: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    channels: Mapping[str, ChannelSource] = dataclasses.field(default_factory=dict)
     source: str = dataclasses.field(default="arguments", compare=False)
 
     @property
     def digest(self) -> str:
-        """Sixteen hexadecimal digits that change with any value."""
-        values = {k: v for k, v in vars(self).items() if k != "source"}
+        """Sixteen hexadecimal digits that change with any value, except where columns are read."""
+        unused = {"source", "channels"} | {
+            k for k in ("family", "braid_angle") if not vars(self)[k]
+        }
+        values = {k: v for k, v in vars(self).items() if k not in unused}
         values["tolerance"] = dict(self.tolerance)
         for name in ("noise", "parameters"):  # they leave the digests of other files alone
             given = dict(values.pop(name))
@@ -216,12 +244,15 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
         if key in noises and value is not None
     }
     given["parameters"] = _parameters(data.get("parameters"))
+    if sections["muscle"].get("family") is not None:
+        given["family"] = _family(sections["muscle"]["family"])
     if data.get("load") is not None:
         given["load"] = data["load"]
     given |= _history(sections["history"])
     given["repeats"] = _repeats(data.get("repeats"))
     given["valve_closed"] = _labels(data.get("valve_closed"), "valve_closed")
     given["tolerance"] = _tolerance(data.get("tolerance"))
+    given["channels"] = sources_of(data.get("channels"))
     return given
 
 
@@ -250,6 +281,12 @@ def _number(value: Any, key: str, unit: str) -> float:
     if number is None:
         raise ValueError(f"{key} must be a number in {unit}, got {shown(value)}")
     return number
+
+
+def _family(value: Any) -> str:
+    good = value in MUSCLES
+    _require(good, f"muscle.family is {shown(value)}; choose one of {', '.join(MUSCLES)}")
+    return str(value)
 
 
 def _history(section: Mapping[str, Any]) -> dict[str, Any]:

@@ -76,13 +76,13 @@ STRANDS = len(BREAKS)
 class StrandEffects:
     """Friction of the braid's strands: four Maxwell-slip elements in parallel with the muscle."""
 
-    strand_1: float = effect("N", 0.0, 500.0, "friction of the first strands to break away")
-    strand_2: float = effect("N", 0.0, 500.0, "friction of the second strands to break away")
-    strand_3: float = effect("N", 0.0, 500.0, "friction of the third strands to break away")
-    strand_4: float = effect("N", 0.0, 500.0, "friction of the last strands to break away")
+    strand_1: float = effect("N", 0.0, 5e4, "friction of the first strands to break away")
+    strand_2: float = effect("N", 0.0, 5e4, "friction of the second strands to break away")
+    strand_3: float = effect("N", 0.0, 5e4, "friction of the third strands to break away")
+    strand_4: float = effect("N", 0.0, 5e4, "friction of the last strands to break away")
     strand_break: float = assumed(0.02, "1", 0.001, 0.3, "strain at which the last strand slips")
     strand_per_pressure: float = assumed(
-        0.0, "1/Pa", -2e-6, 1e-4, "slip force gained over that at no pressure", neutral=0.0
+        0.0, "1/Pa", -2e-3, 0.1, "slip force gained over that at no pressure", neutral=0.0
     )
 
 
@@ -142,9 +142,9 @@ class LengthYieldEffects:
     no energy whatever length and pressure do (:mod:`pam_envs.kernels.yielding`).
     """
 
-    yield_force: float = effect("N", 0.0, 500.0, "friction at full yield, at no pressure")
+    yield_force: float = effect("N", 0.0, 5e4, "friction at full yield, at no pressure")
     yield_per_pressure: float = assumed(
-        0.0, "N/Pa", -1e-3, 1e-3, "friction gained with effective pressure", neutral=0.0
+        0.0, "N/Pa", -0.1, 0.1, "friction gained with effective pressure", neutral=0.0
     )
     yield_break: float = assumed(0.01, "1", 0.001, 0.3, "strain over which it yields, likewise")
     yield_ratio: float = assumed(
@@ -197,7 +197,7 @@ MAP_TERMS = (
 )  # fmt: skip
 """Orders in pressure and in strain of the terms of a finer static map: those of total order five
 that the law of the muscle does not have."""
-_TERM = "N", -500.0, 500.0
+_TERM = "N", -5e4, 5e4
 
 
 @dataclass(frozen=True, kw_only=True)

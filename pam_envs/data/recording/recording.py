@@ -24,10 +24,10 @@ from pam_envs.data.recording.columns import (
     RecordingError,
     Sheet,
     read_header,
-    read_sheet,
     refuse,
     rows_text,
 )
+from pam_envs.data.recording.formats.mapped import is_log, sheet_of
 from pam_envs.data.rig_file import Rig
 from pam_envs.data.tables import READINGS, ContractionTable, load_readings
 from pam_envs.wording import near
@@ -320,12 +320,13 @@ class Recording:
 
 
 def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
-    """Read a recording from a CSV file, put on even steps.
+    """Read a recording from a CSV file or a log file, put on even steps.
 
     Parameters
     ----------
     path : str or Path
-        Columns as in ``docs/recording.md``, in any order.
+        Columns as in ``docs/recording.md``, in any order; or a file whose channels the rig maps to
+        these columns (``docs/formats.md``).
     rig : Rig, optional
         Names the segments with the valve shut, which must exist.
 
@@ -336,7 +337,7 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
     """
     if rig is not None and rig.plant in WIRINGS:
         return _load_of_plant(path, rig)
-    sheet = read_sheet(path, COLUMNS, REQUIRED, "a recording")
+    sheet = sheet_of(path, rig.channels if rig else {}, COLUMNS, REQUIRED, "a recording")
     if not {"pressure_bar", "contraction_mm"} & set(sheet.cells):
         text = "give at least one of the columns pressure_bar and contraction_mm"
         if "force_N" in sheet.cells:
@@ -357,6 +358,8 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
 
 def read_input(path: str | Path, rig: Rig | None = None) -> Recording | ContractionTable:
     """Read a recording or a table of settled readings, according to its columns."""
+    if is_log(path) or (rig is not None and rig.channels):
+        return load_recording(path, rig)
     header = set(read_header(path))
     if rig is not None and rig.plant in WIRINGS:
         return load_recording(path, rig)
@@ -397,7 +400,7 @@ def _load_of_plant(path: str | Path, rig: Rig) -> Recording:
     """Read a recording of a plant with more than one muscle."""
     wiring = WIRINGS[rig.plant]
     fields = {c.column: c for c in (*wiring.inputs, *wiring.outputs)}
-    sheet = read_sheet(path, ("time_s", "segment", *fields), ("time_s",), "a recording")
+    sheet = sheet_of(path, rig.channels, ("time_s", "segment", *fields), ("time_s",), "a recording")
     n, problems, columns = len(sheet.rows), [], {}
     for name in ("time_s", *fields):
         if name not in sheet.cells:

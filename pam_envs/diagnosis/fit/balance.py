@@ -136,7 +136,9 @@ class Balance:
         near = path[rows], pressure[rows], force, gaps, speed
         made = cls(family, rows, *near, path, pressure, noise, plant.muscle.braid_strain)
         other = (replace(made, braid=strain) for strain in BRAIDS)
-        return min((made, *other), key=lambda balance: balance._finer[0].error)
+        best = min(other, key=lambda balance: balance._finer[0].error)
+        helps = best._finer[0].error < (1.0 - LEAST_GAIN) * made._finer[0].error
+        return best if helps else made
 
     def solve(self) -> dict[str, float]:
         """Return coefficients of the static law and play weights."""

@@ -13,6 +13,7 @@ from pam_envs.arrays import Array
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.muscle.effective_area import MAP_SIZES
 from pam_envs.muscle.effects import MAP_TERMS
 from pam_envs.parameters import declarations
 from pam_envs.plants.core.plant import UnstableParameters
@@ -31,8 +32,8 @@ NOT_MONOTONE = 100.0
 """Weight of a unit of such a violation."""
 LEVELS, MARGIN = (6, 10), 1.05
 """Levels of pressure and strain by which recorded states are grouped for these checks, and range of
-the map
-over that of the groups."""
+the map over that of the groups."""
+YIELD = "muscle.yield_force"
 SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.gain": {"scale": 0.01},
     "regulator.time_constant": {"log": True, "prior": 1.5},
@@ -56,6 +57,20 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
 }
 """Base parameters with the settings of their fits that differ from the declarations."""
+USUAL = {
+    "mass.moving_mass": (0.05, 5.0),
+    "mass.damping": (10.0, 1e4),
+    "muscle.strand_per_pressure": (-2e-6, 1e-4),
+    "muscle.yield_per_pressure": (-1e-3, 1e-3),
+    **dict.fromkeys((*(f"muscle.strand_{k}" for k in (1, 2, 3, 4)), YIELD), (0.0, 500.0)),
+    **dict.fromkeys((f"muscle.{name}" for name in MAP_SIZES), (-500.0, 500.0)),
+}
+"""Bounds of fits [SI], narrower than the declared ones, but widened by the start of a plant."""
+SHARE, FACTOR = 0.2, 20.0
+"""Ratios of the bounds of a fit to a start outside the usual bounds."""
+LEAST_SCALE = 0.01
+"""Least scale over the start, for forces of large muscles."""
+FORCES = ("muscle.braid_force", "muscle.stiffness", "muscle.softening", "muscle.hardening")
 ORIFICES = {
     "regulator.conductance": 3e-10,
     "regulator.exhaust_share": 1.0,
@@ -209,9 +224,17 @@ class MuscleFamily:
         d, value = declared(self.plant, name), self.plant.value(name)
         made = dict(low=d.low, high=d.high, start=value)
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
+        if name in USUAL:
+            low, high = USUAL[name]
+            least = SHARE * value if value > 0.0 else FACTOR * value
+            made["low"] = max(d.low, min(low, least))
+            made["high"] = min(d.high, max(high, FACTOR * value))
         if name == SOURCE:  # a muscle is filled from above its largest setpoint
             made["low"] = max(d.low, LEAST_SOURCE * self.plant.regulator.max_pressure)
-        return Free(name, R.place(name), **{**made, **SETTINGS.get(name, {}), **changes})
+        made |= SETTINGS.get(name, {})
+        if name in FORCES:
+            made["scale"] = max(made["scale"], LEAST_SCALE * abs(value))
+        return Free(name, R.place(name), **{**made, **changes})
 
     def base(self) -> tuple[Free, ...]:
         """Return the base parameters, with those of effects that the plant already has."""
