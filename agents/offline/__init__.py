@@ -1,0 +1,1 @@
+"""Offline learning from data sets in the format of Minari: behaviour cloning, implicit Q-learning."""
