@@ -1,1 +1,1 @@
-"""Offline learning from data sets in the format of Minari: behaviour cloning, implicit Q-learning."""
+"""Offline learning from data sets in Minari's format: behaviour cloning, implicit Q-learning."""

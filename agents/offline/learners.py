@@ -4,6 +4,7 @@ Both fit the same policy: layers in parallel with a linear path of the inputs, w
 fixed differences of the environment's preset.
 """
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -80,7 +81,8 @@ class Critic(nn.Module):
         super().__init__()
         self.inputs = inputs
         width = len(inputs.matrix)
-        self.first, self.second = (self._value(width + actions, hidden) for _ in range(2))
+        self.first = self._value(width + actions, hidden)
+        self.second = self._value(width + actions, hidden)
         self.state = self._value(width, hidden)
 
     @staticmethod
@@ -155,8 +157,7 @@ class _Iql:
 
     def __init__(self, critic: Critic, settings: Settings) -> None:
         self.critic, self.settings = critic, settings
-        self.target = Critic(critic.inputs, settings.hidden, critic.first[0].in_features - len(critic.inputs.matrix))
-        self.target.load_state_dict(critic.state_dict())
+        self.target = copy.deepcopy(critic)
         self.optimiser = torch.optim.Adam(critic.parameters(), 3e-4)
 
     def step(
@@ -171,14 +172,12 @@ class _Iql:
         shares = torch.where(advantage > 0.0, settings.expectile, 1.0 - settings.expectile)
         wanted = rewards + settings.discount * (1.0 - ended) * next_value
         loss = (shares * advantage.square()).mean()
-        for value in self.critic.pair(seen, given):
-            loss = loss + (value - wanted).square().mean()
+        for one in self.critic.pair(seen, given):
+            loss = loss + (one - wanted).square().mean()
         self.optimiser.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         self.optimiser.step()
         with torch.no_grad():
-            for slow, fast in zip(
-                self.target.parameters(), self.critic.parameters(), strict=True
-            ):
+            for slow, fast in zip(self.target.parameters(), self.critic.parameters(), strict=True):
                 slow.lerp_(fast, settings.target)
         return torch.exp(settings.temperature * advantage.detach()).clamp_max(MOST_WEIGHT)

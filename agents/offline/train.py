@@ -34,7 +34,9 @@ def train(folder: Path, settings: Settings, out: Path, start: Start) -> Path:
     plants, from which the data came.
     """
     if settings.algo not in ALGORITHMS:
-        raise SettingsError(f"no algorithm named {settings.algo!r}{near(settings.algo, ALGORITHMS)}")
+        raise SettingsError(
+            f"no algorithm named {settings.algo!r}{near(settings.algo, ALGORITHMS)}"
+        )
     data = DataSet(folder)
     given = data.metadata["settings"]
     arguments = {**given["arguments"], "normalize": True}
@@ -42,7 +44,8 @@ def train(folder: Path, settings: Settings, out: Path, start: Start) -> Path:
     preset = presets.preset(data.env, "ppo")
     matrix = input_matrix(preset.network, tuple(env.signals.names()))
     policy = learn(data.transitions("train"), matrix, settings, start(settings.steps))
-    kwargs = {name: value for name, value in arguments.items() if name not in ("randomize", "normalize")}
+    set_elsewhere = ("randomize", "normalize")
+    kwargs = {name: value for name, value in arguments.items() if name not in set_elsewhere}
     config = dataclasses.replace(
         preset, env_kwargs=kwargs, plants=dataclasses.replace(preset.plants, randomize=True)
     )

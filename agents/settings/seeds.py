@@ -1,9 +1,9 @@
 """Disjoint environment seeds for training and for tuning, apart from those of benchmarks.
 
 Training uses seeds from ``TRAINING`` on; evaluations that choose settings and policies use the
-seeds from ``TUNING`` on, data sets those from ``DATA`` on. Scenarios use seeds below ``TUNING``, and
-each audit round draws its own. Scored episodes are therefore used neither in training nor in the
-choice of settings.
+seeds from ``TUNING`` on, data sets those from ``DATA`` on. Scenarios use seeds below ``TUNING``,
+and each audit round draws its own. Scored episodes are therefore used neither in training nor in
+the choice of settings.
 """
 
 TUNING = 900_000

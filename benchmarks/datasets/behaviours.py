@@ -58,7 +58,7 @@ def excitation(period: float) -> Plan:
     """
 
     def plan(random: np.random.Generator, steps: int, actions: int) -> Array:
-        times = period * np.arange(steps)
+        times = period * np.arange(steps, dtype=np.float64)
         return np.stack([_excitation(random, times) for _ in range(actions)], axis=1)
 
     return plan
@@ -73,7 +73,8 @@ def _excitation(random: np.random.Generator, times: Array) -> Array:
         total: Array = waves.sum(axis=1)
         return RANGE * total / np.abs(total).max()
     most = int(times[-1] / HOLDS[0]) + 2
-    holds = np.exp(random.uniform(*np.log(HOLDS), most))
+    shortest, longest = HOLDS
+    holds = shortest * (longest / shortest) ** random.uniform(0.0, 1.0, most)
     changes = np.concatenate([[0.0], np.cumsum(holds)])
     levels = random.uniform(-RANGE, RANGE, len(changes))
     if form == 1:

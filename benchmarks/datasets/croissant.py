@@ -56,9 +56,10 @@ def describe(folder: Path, metadata: Mapping[str, Any]) -> dict[str, Any]:
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "name": metadata["dataset_id"].replace("/", "-"),
         "description": (
-            f"{metadata['total_steps']} control periods in {metadata['total_episodes']} episodes of "
-            f"the simulated environment {settings['env']} (pneumatic artificial muscles); behaviour: "
-            f"{settings['behaviour']}. SI units. Each episode has drawn its own plant parameters."
+            f"{metadata['total_steps']} control periods in {metadata['total_episodes']} episodes "
+            f"of the simulated environment {settings['env']} (pneumatic artificial muscles); "
+            f"behaviour: {settings['behaviour']}. SI units. Each episode has drawn its own plant "
+            "parameters."
         ),
         "license": "https://spdx.org/licenses/MIT.html",
         "version": settings["pam_envs"],

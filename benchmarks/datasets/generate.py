@@ -43,7 +43,7 @@ class Order:
         if self.steps < 1:
             raise ValueError(f"steps = {self.steps} is below 1; give the number of control periods")
         if not 0.0 <= self.noise <= 1.0:
-            raise ValueError(f"noise = {self.noise:g} must be from 0 to 1 (half the action's range)")
+            raise ValueError(f"noise = {self.noise:g} must be from 0 to 1 (half the range)")
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -70,7 +70,7 @@ def behaviour(order: Order, kind: str) -> Behaviour:
         return Behaviour("steps, ramps, multisine", behaviours.excitation(env.control_period))
     if kind == "classical":
         name = order.controller or CLASSICAL[order.env]
-        made = make_controller(name, env.plant, env.signals, env.action_signals)
+        made: Any = make_controller(name, env.plant, env.signals, env.action_signals)
     else:
         given = order.policies.get(kind)
         policy = OnnxPolicy.load(trained(order, kind) if given is None else given)

@@ -99,7 +99,8 @@ def drawn_parameters(env: Any, rows: int) -> list[Drawn]:
         ends = np.stack([low[tile, : len(names), lane], high[tile, : len(names), lane]], axis=1)
         chosen = [k for k, (least, most) in enumerate(ends) if least < most]
         values = {names[k]: float(state["fixed"][tile, k, lane]) for k in chosen}
-        made.append(Drawn(values, {names[k]: (float(ends[k, 0]), float(ends[k, 1])) for k in chosen}))
+        ranges = {names[k]: (float(ends[k, 0]), float(ends[k, 1])) for k in chosen}
+        made.append(Drawn(values, ranges))
     return made
 
 
@@ -116,8 +117,7 @@ def rollout(
     observation, info = env.reset(seed=list(seeds))
     drawn = drawn_parameters(env, count)
     keys = [key for key in info if key in ("output", "reference") or key.startswith("state/")]
-    seen, infos = [observation], [_table(info, keys)]
-    given, rewards, terminations, truncations = [], [], [], []
+    columns: tuple[list[Any], ...] = ([observation], [], [], [], [], [_table(info, keys)])
     state, start, lengths = None, np.ones(count, bool), np.zeros(count, np.int64)
     running = np.ones(count, bool)
     for step in range(steps):
@@ -133,18 +133,16 @@ def rollout(
             final = info["final_info"]
             last, table = observation.copy(), np.where(start, _table(final, keys), table)
             last[start] = np.stack(list(info["final_obs"][start]))
-        for column, value in zip(
-            (given, rewards, terminations, truncations, seen, infos),
-            (action, reward, terminated, truncated, last, table),
-            strict=True,
-        ):
+        values = (last, action, reward, terminated, truncated, table)
+        for column, value in zip(columns, values, strict=True):
             column.append(value)
         lengths += running
         running &= ~start
         if not running.any():
             break
-    whole = tuple(map(np.array, (seen, given, rewards, terminations, truncations, infos)))
-    return [_episode(whole, keys, row, n, seeds[row]) for row, n in enumerate(lengths)], drawn
+    whole = tuple(map(np.array, columns))
+    numbers = lengths.tolist()
+    return [_episode(whole, keys, row, n, seeds[row]) for row, n in enumerate(numbers)], drawn
 
 
 def _table(info: Mapping[str, Any], keys: Sequence[str]) -> Array:

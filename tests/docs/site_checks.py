@@ -6,9 +6,9 @@ accessibility (axe-core, from the package ``axe-playwright-python``) with one.
 
 import sys
 import tempfile
-from importlib.util import find_spec
 from collections.abc import Iterable, Iterator
 from html.parser import HTMLParser
+from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
