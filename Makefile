@@ -71,6 +71,7 @@ images: $(READY) ## Draw the pictures of the documentation
 
 $(VENV)/.docs: $(READY)
 	@$(INSTALL) --editable ".[docs]" --constraint constraints.txt
+	@$(INSTALL) --no-deps axe-playwright-python==0.1.8 # axe-core alone, without the browser driver
 	@touch $@
 
 build/docs-extra/board: $(READY)

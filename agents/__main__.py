@@ -361,6 +361,33 @@ def presets() -> None:
         print(f"{env}  {kind}  {config.steps:,} steps, {how}")
 
 
+def offline(
+    data: Annotated[Path, tyro.conf.Positional],
+    /,
+    algo: Literal["bc", "iql"] = "bc",
+    steps: int = 20_000,
+    seed: int = 0,
+    out: Path | None = None,
+) -> None:
+    """Learn a policy from a data set by behaviour cloning or implicit Q-learning.
+
+    Args:
+        data: Folder of a data set, for example datasets/PAM/KneeWalk/expert-v0.
+        algo: bc: behaviour cloning; iql: implicit Q-learning.
+        steps: Steps of the gradient.
+        seed: Seed of weights and batches.
+        out: Folder of the policy; default: runs/offline/ENV/KIND/ALGO-seedSEED.
+    """
+    from agents.offline.learners import Settings
+    from agents.offline.train import train as learn
+    from sweeps.progress import progress
+
+    _check_counts(steps=(steps, 1), seed=(seed, 0))
+    folder = out or Path("runs/offline", *data.resolve().parts[-2:], f"{algo}-seed{seed}")
+    with progress("gradient steps") as start:
+        print(learn(data, Settings(algo, steps, seed), folder, start))
+
+
 COMMANDS: dict[str, Any] = {
     "train": train,
     "sweep": sweep,
@@ -370,6 +397,7 @@ COMMANDS: dict[str, Any] = {
     "show": show,
     "watch": watch,
     "evaluate": evaluate,
+    "offline": offline,
     "evaluations": evaluations,
     "presets": presets,
 }
@@ -384,7 +412,8 @@ def main(arguments: list[str] | None = None) -> int:
             "interrupted; finished results and checkpoints are kept; the same command continues",
         )
     except ModuleNotFoundError as error:
-        print(f"error: training needs {error.name}; install the extra 'agents'", file=sys.stderr)
+        extra = "data" if error.name == "minari" else "agents"
+        print(f"error: training needs {error.name}; install the extra {extra!r}", file=sys.stderr)
         return 2
 
 

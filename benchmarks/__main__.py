@@ -559,6 +559,55 @@ def example(folder: Path | None = None) -> int:
     return 0
 
 
+def dataset(
+    env: Positional[str],
+    kind: tuple[str, ...] = (),
+    steps: int = 1_000_000,
+    noise: float = 0.05,
+    controller: str = "",
+    medium: Path | None = None,
+    expert: Path | None = None,
+    training_steps: int | None = None,
+    episode_seconds: float | None = None,
+    out: Path = Path("datasets"),
+) -> int:
+    """Write data sets of an environment for offline learning (Minari, with Croissant metadata).
+
+    Every episode draws its own plant. Existing data sets are kept. See docs/datasets.md.
+
+    Args:
+        env: Id of the environment.
+        kind: random, classical, medium, expert, excitation; all by default.
+        steps: Control periods of each data set, at least.
+        noise: Standard deviation of the noise that every second episode of a controller or policy
+            adds to its action, in units of half the action's range.
+        controller: Classical controller; that of the environment's paper by default.
+        medium: Policy of the medium data; by default one is trained with a tenth of the steps.
+        expert: Policy of the expert data; by default one is trained by the PPO preset.
+        training_steps: Steps of that training, the preset's by default.
+        episode_seconds: Length of an episode [s], the environment's by default.
+        out: Folder of the data sets.
+    """
+    from benchmarks.datasets import generate
+    from benchmarks.datasets.behaviours import KINDS
+
+    policies = {name: path for name, path in (("medium", medium), ("expert", expert)) if path}
+    order = generate.Order(
+        full_id(env),
+        kind or KINDS,
+        steps,
+        noise,
+        controller,
+        policies,
+        training_steps,
+        episode_seconds,
+    )
+    with progress("episodes") as start:
+        for folder in generate.generate(order, out, start):
+            print(folder, flush=True)
+    return 0
+
+
 COMMANDS: dict[str, Callable[..., int]] = {
     "run": run,
     "board": board,
@@ -580,6 +629,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "show": show,
     "diagnosis": diagnosis,
     "example": example,
+    "dataset": dataset,
 }
 
 

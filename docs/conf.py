@@ -154,10 +154,36 @@ def folded(_app, _page, _template, context, _doctree) -> None:
         context["toctree"] = lambda **options: whole(**{**options, "collapse": True})
 
 
+ACCESSIBLE = {
+    r'<p class="caption" role="heading">': '<p class="caption" role="heading" aria-level="2">',
+    r'<aside class="sidebar-drawer">': '<aside class="sidebar-drawer" aria-label="Pages">',
+    r'<aside class="toc-drawer': '<aside aria-label="This page" class="toc-drawer',
+    r"<pre>": '<pre tabindex="0">',
+    r'<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
+    r'<th class="(head[^"]*)"><p></p></th>': r'<td class="\1"></td>',
+    r'(?<!</h1>\n)<div id="search-results">': '<h1>Search</h1>\n<div id="search-results">',
+}
+"""Marks for screen readers and keyboards that the theme leaves out."""
+
+
+def accessible(app, error) -> None:
+    """Add the marks of ACCESSIBLE to the pages; those of the board and the playground have them."""
+    own = [app.outdir / path.name for extra in html_extra_path for path in Path(extra).iterdir()]
+    for page in Path(app.outdir).rglob("*.html"):
+        if error is None and not any(page.is_relative_to(folder) for folder in own):
+            text = page.read_text(encoding="utf-8")
+            marked = text
+            for plain, better in ACCESSIBLE.items():
+                marked = re.sub(plain, better, marked)
+            if marked != text:
+                page.write_text(marked, encoding="utf-8")
+
+
 def setup(app) -> None:
     """Connect the above, in their order relative to napoleon, myst-nb and furo."""
     app.connect("html-page-context", folded, priority=100)
     app.connect("autodoc-process-docstring", plain_markup, priority=400)
     app.connect("config-inited", only_pages, priority=900)
+    app.connect("build-finished", accessible)
     if not API:
         app.add_directive("autosummary", Nothing)

@@ -1,4 +1,4 @@
-"""The wheel is complete and small, and the README's snippets run from it."""
+"""Wheel and source distribution are complete and small; the pages' snippets run from the wheel."""
 
 import ast
 import os
@@ -6,6 +6,7 @@ import re
 import runpy
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -13,6 +14,16 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = {"baselines", "agents", "sweeps"}
+RUN_START = """
+import re, sys
+wheel, page = sys.argv[1:]
+sys.path.insert(0, wheel)
+names = {"__name__": "start"}
+with open(page) as file:
+    for snippet in re.findall(r"^```python\\n(.*?)^```$", file.read(), re.M | re.S):
+        exec(snippet, names)
+print("error", abs(names["info"]["output"] - names["info"]["reference"]))
+"""
 RUN_README = """
 import re, sys
 wheel, page = sys.argv[1:]
@@ -95,6 +106,31 @@ def test_snippets_of_the_readme_run_from_the_wheel(installed, tmp_path):
     page = str(ROOT / "README.md")
     said = run(installed, "-W", "error", "-c", RUN_README, str(installed), page, where=tmp_path)
     assert 0.0 < float(said.rpartition("rms")[2]) < 0.5e-3  # m
+
+
+def test_snippets_of_the_start_page_run_from_the_wheel(installed, tmp_path):
+    page = str(ROOT / "docs/start.md")
+    said = run(installed, "-W", "error", "-c", RUN_START, str(installed), page, where=tmp_path)
+    assert float(said.rpartition("error")[2]) < 1e-3  # m, after 10 s
+
+
+def test_source_distribution_is_small_and_gives_the_same_wheel(wheel, tmp_path):
+    sdist = pytest.importorskip("hatchling.builders.sdist").SdistBuilder(str(ROOT))
+    (made,) = map(Path, sdist.build(directory=str(tmp_path), versions=["standard"]))
+    objects = sum(file.stat().st_size for file in ROOT.glob("pam_envs/kernels/objects/*"))
+    assert made.stat().st_size - objects <= 2_000_000
+    with tarfile.open(made) as archive:
+        archive.extractall(tmp_path, filter="data")
+    source = tmp_path / "pam_envs-0.1.0"
+    builders = pytest.importorskip("hatchling.builders.wheel")
+    (again,) = builders.WheelBuilder(str(source)).build(
+        directory=str(tmp_path / "again"), versions=["standard"]
+    )
+    first, second = (
+        {entry.filename: entry.CRC for entry in zipfile.ZipFile(path).infolist()}
+        for path in (wheel, again)
+    )
+    assert first == second
 
 
 def test_links_of_the_readme_are_absolute_with_a_repository():

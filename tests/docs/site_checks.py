@@ -1,12 +1,14 @@
 """Checks of the built documentation site: ``python -m tests.docs.site_checks build/docs``.
 
-Links and files without a browser; errors, loading from the network and sideways scrolling with one.
+Links and files without a browser; errors, loading from the network, sideways scrolling and
+accessibility (axe-core, from the package ``axe-playwright-python``) with one.
 """
 
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from html.parser import HTMLParser
+from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -23,6 +25,19 @@ TOO_WIDE = """(() => {
     + wide.slice(0, 3).map((one) => one.outerHTML.slice(0, 80)).join(" | ");
 })()"""
 """Expression: the first elements beyond the right edge, empty if the page does not scroll."""
+
+AXE = """axe.run(document, {preload: false, resultTypes: ["violations"]}).then((found) =>
+  found.violations.map((one) => `${one.id} (${one.nodes.length}): ${one.help}: `
+    + one.nodes[0].html.slice(0, 120)))"""
+"""Expression: the violations that axe finds, one sentence for each rule."""
+
+
+def axe_script() -> str | None:
+    """Return the source of axe-core, None if it is not installed."""
+    found = find_spec("axe_playwright_python")
+    if found is None or found.origin is None:
+        return None
+    return Path(found.origin).with_name("axe.min.js").read_text(encoding="utf-8")
 
 
 class Links(HTMLParser):
@@ -72,7 +87,8 @@ def broken_links(folder: Path) -> Iterator[str]:
 
 
 def faults_in_browser(chosen: Iterable[Path], program: str) -> Iterator[str]:
-    """Return console errors and sideways scrolling of pages on a phone."""
+    """Return console errors, violations of accessibility and sideways scrolling on a phone."""
+    axe = axe_script()
     with (
         tempfile.TemporaryDirectory() as folder,
         Browser(program, Path(folder) / "profile") as browser,
@@ -80,6 +96,9 @@ def faults_in_browser(chosen: Iterable[Path], program: str) -> Iterator[str]:
         for path in chosen:
             try:
                 with browser.page(path.as_uri()) as page:
+                    if axe is not None:
+                        page.evaluate(f"{axe}; 0")
+                        yield from (f"{path}: {fault}" for fault in page.evaluate(AXE))
                     page.resize(*PHONE)
                     if wide := page.evaluate(TOO_WIDE):
                         yield f"{path}: {wide}"
@@ -92,6 +111,8 @@ def main() -> None:
     folder = Path(sys.argv[1]).resolve()
     faults = list(broken_links(folder))
     program = find()
+    if axe_script() is None:
+        print("no axe here: pip install --no-deps axe-playwright-python to check accessibility")
     if program is None:
         print(f"no browser here: install one of {', '.join(NAMES)} to check the pages in it")
     else:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.browser import NAMES, find
-from tests.docs.site_checks import broken_links, faults_in_browser, pages
+from tests.docs.site_checks import axe_script, broken_links, faults_in_browser, pages
 
 pytest.importorskip("furo")
 pytest.importorskip("myst_nb")
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.xdist_group("site")
 ROOT = Path(__file__).parents[2]
 PROGRAM = find()
 SKIPPED = ("genindex.html", "search.html", "py-modindex.html")
-LEAFLET = "<!doctype html><title>placeholder</title>"
+LEAFLET = '<!doctype html><html lang="en"><title>x</title><main><h1>Placeholder</h1></main></html>'
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_links_resolve_and_nothing_is_loaded_from_the_network(site):
 
 
 @pytest.mark.skipif(PROGRAM is None, reason=f"no browser here; install one of {', '.join(NAMES)}")
-def test_pages_have_no_console_error_and_fit_a_phone(site):
+def test_pages_have_no_console_error_are_accessible_and_fit_a_phone(site):
     shown = [page for page in pages(site) if page.name not in SKIPPED]
     assert list(faults_in_browser(shown, PROGRAM)) == []
 
@@ -65,3 +65,15 @@ def test_faults_of_a_page_are_found(tmp_path):
     assert list(broken_links(tmp_path)) == [
         "broken.html links to none.html, which does not exist",
     ]
+
+
+@pytest.mark.skipif(PROGRAM is None, reason=f"no browser here; install one of {', '.join(NAMES)}")
+@pytest.mark.skipif(axe_script() is None, reason="axe-playwright-python is not installed")
+def test_violations_of_accessibility_are_found(tmp_path):
+    page = tmp_path / "page.html"
+    text = '<!doctype html><html lang="en"><title>x</title><main><h1>x</h1>{}</main></html>'
+    page.write_text(text.format('<img src="data:," alt="a line">'))
+    assert list(faults_in_browser([page], PROGRAM)) == []
+    page.write_text(text.format('<img src="data:,">'))
+    (fault,) = faults_in_browser([page], PROGRAM)
+    assert "image-alt (1)" in fault

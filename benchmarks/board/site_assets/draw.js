@@ -97,7 +97,7 @@ function path(xs, ys, toX, toY) {
 // Lines over common axes. Each line: {x, y, kind, name}; kind is a class of the style sheet.
 function chart({ width, height, lines, across, up }) {
   const left = 58, right = 8, top = 18, bottom = across ? 34 : 18;
-  const svg = shape("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img" });
+  const svg = shape("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": up });
   const rangeX = span(lines.map((line) => line.x)), rangeY = span(lines.map((line) => line.y));
   const toX = (v) => left + ((v - rangeX[0]) / (rangeX[1] - rangeX[0])) * (width - left - right);
   const toY = (v) => height - bottom - ((v - rangeY[0]) / (rangeY[1] - rangeY[0])) * (height - top - bottom);
@@ -127,7 +127,7 @@ function placesPicture(change) {
   const names = Object.keys(change.places), count = names.length;
   const step = 190, side = 210, line = 22, top = 34;
   const width = 2 * side + step * (change.tracks.length - 1), height = top + line * count + 26;
-  const svg = shape("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img" });
+  const svg = shape("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": "Places of the controllers in each track" });
   const taken = change.tracks.map(() => ({}));
   const spot = (name, k) => {
     const first = change.places[name][k][0];

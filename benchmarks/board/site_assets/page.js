@@ -168,7 +168,7 @@ function renderChanges() {
   }));
   at("changes").replaceChildren(...headed(heading, lines));
   const chosen = BOARD.changes.find((change) => change.env === (state.env || byName[state.track].env)) ?? BOARD.changes[0];
-  at("places").replaceChildren(...(chosen ? [make("figcaption", { class: "soft" }, `${chosen.env}: places. Blue: learned. Orange: moved by two places or more.`), make("div", { class: "wide" }, placesPicture(chosen))] : []));
+  at("places").replaceChildren(...(chosen ? [make("figcaption", { class: "soft" }, `${chosen.env}: places. Blue: learned. Orange: moved by two places or more.`), make("div", { class: "wide", role: "region", tabindex: "0", "aria-label": "Places in the tracks" }, placesPicture(chosen))] : []));
 }
 
 function render() { renderFilters(); renderRows(); renderChanges(); }

@@ -1,0 +1,1 @@
+"""Data sets for offline learning and identification: behaviours, recording, metadata."""
