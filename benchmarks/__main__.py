@@ -139,11 +139,13 @@ def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
 
     Args:
         results: Folder of the rows.
-        out: File of the board; the pages go to the folder leaderboard beside it.
+        out: File of the board; the pages go to the folder leaderboard beside it. Default:
+            benchmarks/LEADERBOARD.md, or LEADERBOARD.md in another folder of rows.
     """
     from benchmarks.board import leaderboard
 
-    for path in leaderboard.write(results, leaderboard.BOARD if out is None else out):
+    own = leaderboard.BOARD if results == rows.RESULTS else results / leaderboard.BOARD.name
+    for path in leaderboard.write(results, own if out is None else out):
         print(path)
     return 0
 
@@ -153,11 +155,12 @@ def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
 
     Args:
         results: Folder of the rows.
-        out: Folder of the page, benchmarks/site by default.
+        out: Folder of the page. Default: benchmarks/site, or site in another folder of rows.
     """
     from benchmarks.board import site as pages
 
-    written = pages.build(results, pages.OUT if out is None else out)
+    own = pages.OUT if results == rows.RESULTS else results / pages.OUT.name
+    written = pages.build(results, own if out is None else out)
     print(f"{len(written)} files; open {written[0]}")
     return 0
 
@@ -169,21 +172,27 @@ def verify(
 ) -> int:
     """Compute rows again and compare; exit code 1 if one is not reproduced.
 
+    First the audit rounds are compared with those of all earlier commits, which may not change.
     A row must be reproduced to the last bit, or within rounding if it was made with other packages
-    or on another processor. The result is stored in verified.json beside the rows.
+    or on another processor. The result is stored in verified.json beside the rows of this
+    checkout; for other rows nothing is written.
 
     Args:
         row: Files or names of rows.
         all: Every row of benchmarks/results.
     """
     from benchmarks import console
+    from benchmarks.identity import audit as auditing
     from benchmarks.runs import verified
     from benchmarks.runs import verify as checking
 
+    if altered := auditing.altered():
+        raise ValueError("; ".join(altered))
     verdicts = []
     for path in _row_paths(row, all):
         found = checking.verify(path, options.cluster)
-        verified.note(path, found.checksum if found.holds else "", found.mode)
+        if path.resolve().parents[1] == rows.RESULTS.resolve():
+            verified.note(path, found.checksum if found.holds else "", found.mode)
         console.verdict(found)
         verdicts.append(found)
     if len(verdicts) > 1:
@@ -224,7 +233,14 @@ def _row_paths(names: tuple[str, ...], all: bool | None = None) -> list[Path]:
 
 def _row_path(name: str) -> Path:
     given = Path(name)
-    path = given if given.is_file() else rows.path_of(name)
+    if given.is_file() and name.endswith(rows.SUFFIX):
+        return given
+    if not rows.is_name(name):
+        raise ValueError(
+            f"{name!r} is neither a file TRACK/CONTROLLER{rows.SUFFIX} nor a name "
+            "TRACK--CONTROLLER of letters, digits and _"
+        )
+    path = rows.path_of(name)
     if not path.is_file():
         raise ValueError(f"there is no row {name!r}; its file would be {path}")
     return path
