@@ -185,18 +185,19 @@ def diagnose(
         recording, shipped = example.recording_and_rig()
         rig = shipped if rig is None else rig
     declared = Rig() if rig is None else Rig.from_yaml(rig)
+    if declared.plant != Rig().plant:
+        from pam_envs.diagnosis.families.kinds import kind_named
+
+        kind_named(declared.plant)  # before the columns of another plant are refused
     data = read_input(recording, declared)
     if isinstance(data, Recording):
-        from pam_envs.diagnosis.causes import catalogue, causes_in
+        from pam_envs.diagnosis.causes import causes_in
         from pam_envs.diagnosis.diagnosis import diagnose as run
-        from pam_envs.plants.single_muscle.plant import SingleMuscle
+        from pam_envs.diagnosis.families.kinds import kind_named
 
-        if declared.plant != SingleMuscle.family:
-            raise ValueError(
-                f"plant: {declared.plant!r} cannot be diagnosed; there is: {SingleMuscle.family}"
-            )
-        model = None if plant is None else SingleMuscle.from_yaml(plant)
-        every = (*catalogue(), *(causes_in(causes) if causes else ()))
+        kind = kind_named(declared.plant)
+        model = None if plant is None else type(kind.start(declared)).from_yaml(plant)
+        every = (*kind.catalogue, *(causes_in(causes) if causes else ()))
         found = run(data, model, rig=declared, causes=every, seed=seed, progress=not quiet)
         print(f"{found.verdict}: {found.text}")
         for warning in found.report["warnings"]:

@@ -40,7 +40,7 @@ def adapted(
             continue
         found = replace(cause, forms=kept, title=titles.get(cause.name, cause.title))
         if found.in_valve and "command" not in found.needs and not _of_sensors(found):
-            found = replace(found, needs=(*found.needs, "command"))
+            found = replace(found, needs=("command", *found.needs))
         made.append(found)
     return tuple(made)
 
