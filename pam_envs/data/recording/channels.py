@@ -79,13 +79,13 @@ WIRINGS: dict[str, Wiring] = {
 """Channels of the plants with more than one muscle, by family."""
 
 
-def excitation(inputs: Mapping[str, Array], noisy: bool = False) -> Array:
+def excitation(inputs: Mapping[str, Array], samples: int, noisy: bool = False) -> Array:
     """Return the accumulated travel of all inputs, each over its range, in :data:`TRAVEL`.
 
     Holds of all inputs are constant in it, as holds of a command are. ``noisy`` inputs count as
     constant within a small share of their range.
     """
-    total = np.zeros(len(next(iter(inputs.values()))))
+    total = np.zeros(samples)
     for values in inputs.values():
         span = float(np.ptp(values))
         if span > 0.0:

@@ -460,9 +460,7 @@ def _of_plant(
     measured = {
         o: columns[o] for i, o in wiring.measured.items() if i not in driven and o in columns
     }
-    held = {n: v for n, v in driven.items() if np.ptp(v) > 0.0}
-    noisy = not held
-    moved = excitation(held or measured or {"none": np.zeros(len(rows))}, noisy)
+    moved = excitation(driven, len(rows)) + excitation(measured, len(rows), noisy=True)
     made = {**columns, "command": moved, "load": np.zeros(len(rows))}
     return _recording(
         made, labels, rows, notes, tuple(valve_closed), source, inputs, outputs, wiring.channels

@@ -17,6 +17,7 @@ from pam_envs.diagnosis.families.adapted import adapted
 from pam_envs.diagnosis.families.compiled import (
     CompiledFamily,
     calibrate_compiled,
+    one_ahead,
     shut_off,
     with_measured_drive,
 )
@@ -174,7 +175,7 @@ class JointKind:
     def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundJoint:
         """Return a joint with the inputs of a recording."""
         given, n = dict(recording.inputs), len(recording.time)
-        measured = not set(SET_POINTS) <= set(given)
+        measured, regulator = not set(SET_POINTS) <= set(given), plant.regulator
         if measured:
             lacking = [name for name in PRESSURES if name not in recording.outputs]
             if lacking:
@@ -182,8 +183,9 @@ class JointKind:
                     f"the recording has neither both setpoints nor {' and '.join(lacking)}; give "
                     + " and ".join((*SET_POINTS, *lacking))
                 )
-            given |= {s: recording.outputs[p] for s, p in zip(SET_POINTS, PRESSURES, strict=True)}
-            plant = with_measured_drive(plant)
+            pairs = zip(SET_POINTS, PRESSURES, strict=True)
+            given |= {s: one_ahead(recording.outputs[p], recording) for s, p in pairs}
+            plant = with_measured_drive(plant, recording.period)
         usual = channels_of(plant) | {"direct": FROM_THEM}
         names = {"pressure_a": "set_point_a", "pressure_b": "set_point_b"}
         channels = [
@@ -192,9 +194,8 @@ class JointKind:
             else np.broadcast_to(given.get(name, value), (n,))
             for name, value in usual.items()
         ]
-        return BoundJoint(
-            plant, recording.period, drives_of(channels), recording.restart.copy(), measured
-        )
+        data = (plant, recording.period, drives_of(channels), recording.restart.copy())
+        return BoundJoint(*data, regulator if measured else None)
 
     def audit(self, recording: Recording, sheet: Rig) -> Audit:
         """Return the findings on a recording before its diagnosis."""

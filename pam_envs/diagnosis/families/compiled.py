@@ -36,8 +36,10 @@ FINER = (6, 8, 12, 20, 40, 70, 100)
 WEIGHT = "hysteresis.weight["
 WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
 ROUNDS, VALVE_ROUNDS = 25, 12
-INSTANT = {"dead_time": 0.0, "time_constant": 2e-3, "slew_rate": 1e9, "gain": 1.0}
+INSTANT = {"dead_time": 0.0, "slew_rate": 1e9, "gain": 1.0}
 """Parameters of a regulator whose pressures are the measured ones."""
+LEAST_LAG = 2e-3
+"""Least time constant of a regulator [s]."""
 
 
 @dataclass(frozen=True)
@@ -53,19 +55,25 @@ class CompiledFamily:
         Inputs in the order of the family's loop.
     fresh : ndarray of bool, shape (T,)
         Samples at which the plant restarts from rest.
-    measured_drive : bool
-        Whether the measured pressures are the inputs, for lack of commands.
+    regulator : object or None
+        The regulator of the given plant where, for lack of commands, the measured pressures are
+        the inputs, and follow at once.
     """
 
     plant: Any
     period: float
     drives: Array
     fresh: NDArray[np.bool_]
-    measured_drive: bool = False
+    regulator: Any = None
 
     channels: ClassVar[tuple[str, ...]]
     settings: ClassVar[Mapping[str, Mapping[str, Any]]]
     longest_step: ClassVar[float] = 0.0051
+
+    @property
+    def measured_drive(self) -> bool:
+        """Whether the measured pressures are the inputs."""
+        return self.regulator is not None
 
     @property
     def column(self) -> Array:
@@ -156,7 +164,8 @@ class CompiledFamily:
             values["hysteresis.operator"] = operator
         for substeps in (self.plant.substeps, *FINER):
             try:
-                return dataclasses.replace(self.plant, substeps=substeps).replace(values)
+                made = dataclasses.replace(self.plant, substeps=substeps).replace(values)
+                return dataclasses.replace(made, regulator=self.regulator or made.regulator)
             except UnstableParameters as error:
                 unstable = error
         raise unstable
@@ -206,10 +215,22 @@ def shut_off(values: Array, recording: Recording) -> Array:
     return np.where(shut, -1.0, np.maximum(0.0, values))
 
 
-def with_measured_drive(plant: Plant) -> Any:
-    """Return a plant whose pressures follow their setpoints at once."""
+def with_measured_drive(plant: Plant, period: float) -> Any:
+    """Return a plant whose pressures pass through readings that are its setpoints one row ahead.
+
+    Half a period of lag makes the mean delay zero (:func:`one_ahead`).
+    """
     changes = {f"regulator.{name}": value for name, value in INSTANT.items()}
-    return plant.replace({n: v for n, v in changes.items() if n in plant.names})
+    changes["regulator.time_constant"] = max(LEAST_LAG, 0.5 * period)
+    off = {n: v for n, v in plant.neutral.items() if in_valve(n)}
+    return plant.replace({n: v for n, v in {**off, **changes}.items() if n in plant.names})
+
+
+def one_ahead(values: Array, recording: Recording) -> Array:
+    """Return readings one row ahead within each run, shape (T,)."""
+    ahead = np.append(values[1:], values[-1])
+    last = np.append(recording.restart[1:], True)
+    return np.where(last, values, ahead)
 
 
 def calibrate_compiled(

@@ -70,14 +70,15 @@ def campaign(seed: int = 1) -> tuple[dict[str, Array], list[str]]:
 
 
 def readings(
-    plant: AntagonisticJoint, inputs: Mapping[str, Array], seed: int = 4
+    plant: AntagonisticJoint, inputs: Mapping[str, Array], seed: int = 4, **noise: float
 ) -> dict[str, Any]:
-    """Return the noisy readings of a joint."""
+    """Return the noisy readings of a joint; ``noise`` [SI] by sensor."""
     channels = {"pressure_a": inputs["set_point_a"], "pressure_b": inputs["set_point_b"]}
     given = channels | {"payload": inputs["payload"], "direct": 2.0}
     found = replay_plant(plant, given, period=PERIOD, substeps=8)
     random = np.random.default_rng(seed)
-    return {name: v + random.normal(0.0, NOISE[name], len(v)) for name, v in found.items()}
+    sizes = NOISE | noise
+    return {name: v + random.normal(0.0, sizes[name], len(v)) for name, v in found.items()}
 
 
 def recorded(**hidden: float) -> Recording:
