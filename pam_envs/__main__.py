@@ -346,6 +346,65 @@ def warmup(
         print(f"{line}: {seconds:.1f} s", flush=True)
 
 
+def compare_rig(
+    table: tyro.conf.Positional[Path],
+    plant: Path,
+    model: Path | None = None,
+    reference: Path | None = None,
+    holds: int = 60,
+    hold_seconds: float = 4.0,
+    range_mm: tuple[float, float] | None = None,
+    settled_seconds: float = 1.0,
+    runs: int = 8,
+    seed: int = 0,
+    out: Path | None = None,
+) -> None:
+    """Compare measured closed-loop figures of a rig with those that a plant predicts.
+
+    Parameters
+    ----------
+    table : Path
+        CSV file of measured figures: controller, load_kg, rms_mm, ... (docs/rig_comparison.md).
+    plant : Path
+        Plant file of the rig, for example a calibrated one.
+    model : Path
+        Plant file from which the controllers are designed; default: the plant.
+    reference : Path
+        CSV file of the reference on the rig: time_s, reference_mm; default: random holds.
+    holds : int
+        Number of random holds of each run; give as many as on the rig.
+    hold_seconds : float
+        Duration of a hold [s].
+    range_mm : (float, float)
+        Lowest and highest level of the holds [mm]; default: 10 to 90 % of the plant's reach.
+    settled_seconds : float
+        Time at the end of each hold that counts as settled, for bias_mm [s].
+    runs : int
+        Number of simulated runs of each line.
+    seed : int
+        Seed of the first run.
+    out : Path
+        Folder for comparison.json and comparison.png.
+    """
+    from pam_envs.plants.single_muscle.plant import SingleMuscle
+    from pam_envs.rig.comparison import table as tables
+    from pam_envs.rig.comparison.comparison import compare
+    from pam_envs.rig.comparison.prediction import Settings
+    from pam_envs.rig.comparison.references import Holds
+
+    simulated = SingleMuscle.from_yaml(plant)
+    nominal = simulated if model is None else SingleMuscle.from_yaml(model)
+    span = None if range_mm is None else (1e-3 * range_mm[0], 1e-3 * range_mm[1])
+    given = Holds(holds, hold_seconds, span)
+    settings = Settings(simulated, nominal, given, settled_seconds, runs, seed)
+    measured = tables.read(table, simulated.mass.load, reference)
+    found = compare(settings, measured, lambda line: print(line, file=sys.stderr, flush=True))
+    print(found.table())
+    print(found.text)
+    for path in () if out is None else found.write(out):
+        print(f"wrote {path}")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     register_all()
@@ -356,6 +415,7 @@ def main(arguments: list[str] | None = None) -> int:
         "diagnose": diagnose,
         "calibrate": calibrate,
         "reveal": reveal,
+        "compare-rig": compare_rig,
         "export": export,
         "warmup": warmup,
         "doctor": doctor,
