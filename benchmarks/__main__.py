@@ -15,6 +15,7 @@ from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scoring.metrics import shown
 from pam_envs.envs.registration import full_id
 from sweeps.command_line import run_cli
+from sweeps.files import database_named
 from sweeps.progress import progress
 
 Computing = Annotated[runner.Computing, arg(name="")]
@@ -272,7 +273,7 @@ def tune(
     more = {} if storage is None else {"storage": storage}
     job = tuning.job_of(controller, env, trials=trials, seed=seed, episodes=episodes, **more)
     course = tuning.Course(controller, tuning.nominal_track(job.env), episodes)
-    with progress("trials") as start:
+    with database_named(job.storage), progress("trials") as start:
         found = tuning.search(job, course.measure, start)
     print(tuning.sentence(found))
     if write:
@@ -655,7 +656,8 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ.setdefault("PAM_ENVS_COMPILE", "wait")  # rates are of machine code
     return run_cli(
         lambda: ask(COMMANDS, prog="python -m benchmarks", args=arguments),
-        "interrupted; completed work is kept: the same command resumes",
+        "interrupted; no file is half-written; completed cells, cases and trials are kept, and the "
+        "same command resumes",
     )
 
 

@@ -440,7 +440,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"pam-envs: {printable(str(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("pam-envs: interrupted; nothing was written", file=sys.stderr)
+        print("pam-envs: interrupted; no file is half-written", file=sys.stderr)
         return 130
     return int(status or 0)
 

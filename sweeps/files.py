@@ -1,7 +1,9 @@
-"""Digests of source files."""
+"""Digests of source files, and errors of database files."""
 
+import errno
 import hashlib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 SOURCES = {".py", ".yaml", ".yml", ".csv", ".json", ".npz", ".onnx", ".safetensors"}
@@ -17,3 +19,16 @@ def sources_digest(paths: Iterable[Path], kinds: Collection[str] = SOURCES) -> s
                 state.update(file.relative_to(root.parent).as_posix().encode())
                 state.update(file.read_bytes())
     return state.hexdigest()[:16]
+
+
+@contextmanager
+def database_named(path: Path) -> Iterator[None]:
+    """Turn an error of the database in a file, as of a full disk, into an OSError that names it."""
+    try:
+        yield
+    except Exception as error:
+        for cause in (error, error.__cause__, error.__context__):
+            if type(cause).__module__.startswith(("sqlalchemy.", "sqlite3")):
+                reason = str(getattr(cause, "orig", cause))
+                raise OSError(errno.EIO, reason, str(path)) from error
+        raise

@@ -164,6 +164,13 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
         put("controller", "name", "integral/.."),
         "controller.name must match",
     ),
+    "another metric": (lambda row: row["episodes"][0]["scores"].update(best=0.0), "other metrics"),
+    "another entry": (put("", "comment", "x"), "it must not contain .'comment'. properties"),
+    "long text": (put("volatile", "host", "x" * 501), "volatile.host must be shorter"),
+    "control characters": (put("volatile", "machine", "\x1b[31m"), "volatile.machine must match"),
+    "other commit": (put("made_with", "commit", "my own"), "made_with.commit must match"),
+    "other scenario": (lambda row: row["episodes"][0].update(scenario="easy"), "another scenario"),
+    "huge number": (lambda row: row["episodes"][0].update(saturated=1e300), "must be smaller"),
     "another file": (put("", "row", "tiny--inverse"), f"holds 'tiny--inverse'.*{DISAGREE}"),
     "former schema": (put("", "schema", 1), "schema 4, but of 1; run it again: .*--track tiny"),
     "no episodes": (
