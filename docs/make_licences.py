@@ -11,9 +11,9 @@ LONGEST = 250
 HEAD = """# Licences
 
 The package is under the [MIT licence](../LICENSE). Sources and licences of the shipped data are in
-[PROVENANCE](../pam_envs/data/PROVENANCE.md). Nothing of another package is shipped: the table lists the licences that
-the pinned packages of `constraints.txt` that `make venv` installs state in their metadata (`make licences` writes it
-again).
+[PROVENANCE](../pam_envs/data/PROVENANCE.md). Nothing of another package is shipped. The table lists
+the pinned packages that `make venv` installs, with the licence that each states in its metadata
+(`make licences` writes it again).
 
 | package | version | licence |
 |:--|:--|:--|
