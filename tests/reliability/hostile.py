@@ -58,20 +58,20 @@ def isolated(number: int, act: Act) -> Counter[Outcome]:
 
 
 def _child(numbers: range, act: Act, writing: int) -> None:
-    signal.signal(signal.SIGALRM, _hang)
+    signal.signal(signal.SIGPROF, _hang)
     ran: list[str] = []
     sys.addaudithook(lambda event, _: ran.append(event) if event in CODE else None)
     before = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for number in numbers:
         ran.clear()
-        signal.alarm(SECONDS)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)  # of computation
         try:
             outcome = act(number)
         except Hang:
             outcome = "hang"
         except Exception as error:
             outcome = f"traceback {type(error).__name__}"
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
         if ran:
             outcome = "code run"
         if 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before > MEMORY:
@@ -268,9 +268,13 @@ def states(number: int, folder: Path) -> Iterator[tuple[str, int, Counter[Outcom
 def tampered(value: Any, draws: np.random.Generator) -> Any:
     """Return another number of the type of a value, often an extreme one."""
     chosen = draws.choice([1e300, -1e300, 1e9, -1e9, 2.0**40, -3.0, 200.0, np.nan, np.inf])
-    if np.issubdtype(np.asarray(value).dtype, np.floating):
+    kind = np.asarray(value).dtype
+    if kind.kind == "f":
         return chosen
-    return int(np.clip(np.nan_to_num(chosen), -(2.0**62), 2.0**62))
+    if kind.kind == "b":
+        return not value
+    bounds = np.iinfo(kind)
+    return max(bounds.min, min(bounds.max, int(np.nan_to_num(chosen, posinf=2**62))))
 
 
 def checkpoints(number: int, folder: Path) -> Counter[Outcome]:
@@ -311,7 +315,10 @@ def checkpoints(number: int, folder: Path) -> Counter[Outcome]:
             model = train.resume(run)
         except ValueError:
             return "refused"
-        model.learn(64, reset_num_timesteps=False)
+        try:
+            model.learn(64, reset_num_timesteps=False)
+        except ValueError:  # torch finds an action that is not finite; a sentence for the user
+            return "refused"
         return f"finite number of '{path}' accepted"
 
     assert good

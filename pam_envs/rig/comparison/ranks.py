@@ -8,6 +8,7 @@ three pairs in the same order give no interval of width zero, as a bootstrap wou
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -73,18 +74,22 @@ _COEFFICIENTS: dict[str, tuple[Callable[..., Array], Callable[[Array], Array]]] 
 }
 
 
+@lru_cache(maxsize=16)
+def _sampled(kind: str, n: int) -> Array:
+    """Return the coefficient of samples of ``n`` pairs at each correlation, (grid, draws)."""
+    statistic = _COEFFICIENTS[kind][0]
+    x, noise = np.random.default_rng(SEED).standard_normal((2, DRAWS, n))
+    return np.array([statistic(x, r * x + np.sqrt(1.0 - r * r) * noise) for r in GRID])
+
+
 def correlation(kind: str, predicted: ArrayLike, measured: ArrayLike) -> Rank:
     """Return a rank correlation, "kendall" or "spearman", of at least ``FEWEST`` pairs."""
     statistic, population = _COEFFICIENTS[kind]
     value, n = float(statistic(predicted, measured)), np.size(predicted)
     if n < FEWEST or not np.isfinite(value):
         return Rank(*[float("nan")] * 4)
-    x, noise = np.random.default_rng(SEED).standard_normal((2, DRAWS, n))
-    tail, slack = 0.5 * (1.0 - LEVEL), 1e-9
-    above, below = np.empty(len(GRID)), np.empty(len(GRID))
-    for k, r in enumerate(GRID):
-        drawn = statistic(x, r * x + np.sqrt(1.0 - r * r) * noise)
-        above[k], below[k] = (drawn >= value - slack).mean(), (drawn <= value + slack).mean()
+    drawn, tail, slack = _sampled(kind, n), 0.5 * (1.0 - LEVEL), 1e-9
+    above, below = (drawn >= value - slack).mean(1), (drawn <= value + slack).mean(1)
     inside = population(GRID[(above > tail) & (below > tail)])
     chance = float(above[len(GRID) // 2])
     return Rank(value, float(inside.min()), float(inside.max()), chance)

@@ -46,8 +46,8 @@ def order(rankings: Sequence[Ranking]) -> str:
     if rank.high < 0.0:
         return f"{text}: the simulation predicts the opposite of the order on this rig."
     return (
-        f"{text}: no evidence that the order is predicted; a random one agrees as well with "
-        f"probability {rank.chance:.2g}."
+        f"{text}: this does not show that the order is predicted; a random one agrees as well "
+        f"with probability {rank.chance:.2g}."
     )
 
 
