@@ -76,8 +76,8 @@ class EffectiveAreaMuscle(
     area: float = identified(8.7e-4, "m2", 1e-7, 0.2, _FIT)
     area_taper: float = identified(0.0, "1", 0.0, 12.0, _FIT, neutral=0.0)
     braid_force: float = identified(106.0, "N", 0.0, 5e4, _FIT)
-    braid_strain: float = identified(0.0167, "1", 0.002, 0.2, _FIT)
-    stiffness: float = identified(2250.0, "N", -1e6, 1e6, _FIT)
+    braid_strain: float = identified(0.0167, "1", 0.005, 0.2, _FIT)
+    stiffness: float = identified(2250.0, "N", 0.0, 1e6, _FIT)
     hardening: float = identified(8600.0, "N", -1e7, 1e7, _FIT)
     # a static map that has to be finer; neutral in the plain law
     area_curve: float = effect("1", -60.0, 60.0, "the area shrinks with strain squared too")

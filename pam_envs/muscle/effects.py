@@ -221,7 +221,7 @@ class StaticMapEffects:
     map_40: float = effect(*_TERM, "T_4(pressure) T_0(strain)")
     map_41: float = effect(*_TERM, "T_4(pressure) T_1(strain)")
     map_50: float = effect(*_TERM, "T_5(pressure) T_0(strain)")
-    map_pressure: float = assumed(6e5, "Pa", 1e4, 3e6, "upper end of the map")
+    map_pressure: float = assumed(6e5, "Pa", 100.0, 3e6, "upper end of the map")
     map_strain: float = assumed(0.2, "1", 0.02, 0.6, "upper end of the map")
 
 

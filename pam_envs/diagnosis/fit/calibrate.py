@@ -30,6 +30,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
     states_of,
 )
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.flow import REPLACED
 
@@ -103,6 +104,12 @@ def calibrate(
         slow = Balance.of(family, measured[0], pressure, noise[0])
         if slow is not None:
             law, wide = slow.solve(), slow.flexible()
+            plant = family.plant.replace({"muscle.braid_strain": slow.braid})
+            family = dataclasses.replace(family, plant=plant)
+            column[R.MUSCLE_BRAID_STRAIN] = slow.braid
+            problem = dataclasses.replace(
+                problem, simulate=family.simulate, tie=family.tie, violations=family.violations
+            )
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column

@@ -13,7 +13,7 @@ from pam_envs.arrays import Array
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.muscle.effective_area import MAP_SIZES
+from pam_envs.muscle.effective_area import MAP_SIZES, EffectiveAreaMuscle
 from pam_envs.muscle.effects import MAP_TERMS
 from pam_envs.parameters import declarations
 from pam_envs.plants.core.plant import UnstableParameters
@@ -30,9 +30,9 @@ LEAST_STIFFNESS, LEAST_STIFFNESS_OF, LEAST_GAIN = 1.0, 50.0, 0.1
 area: a law below them is not monotone."""
 NOT_MONOTONE = 100.0
 """Weight of a unit of such a violation."""
-LEVELS, MARGIN = (6, 10), 1.05
-"""Levels of pressure and strain by which recorded states are grouped for these checks, and range of
-the map over that of the groups."""
+LEVELS, MARGIN, REACH = (6, 10), 1.05, 1.1
+"""Levels of pressure and strain by which recorded states are grouped for these checks, range of the
+map over that of the groups, and range of the checks without pressure over the recorded one."""
 YIELD = "muscle.yield_force"
 SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.gain": {"scale": 0.01},
@@ -41,7 +41,6 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "muscle.area_taper": {"scale": 0.1, "prior": 60.0},
     "muscle.area_curve": {"scale": 0.5, "prior": 60.0},
     "muscle.braid_force": {"scale": 5.0, "prior": 60.0},
-    "muscle.braid_strain": {"log": True, "low": 0.003, "prior": 1.0},
     "muscle.stiffness": {"scale": 100.0, "prior": 60.0},
     "muscle.softening": {"scale": 500.0, "prior": 60.0},
     "muscle.hardening": {"scale": 2e3, "prior": 60.0},
@@ -253,6 +252,8 @@ class MuscleFamily:
     def plant_of(self, column: Array) -> SingleMuscle:
         """Return the plant with the parameters of a column."""
         values: dict[str, Any] = {n: float(column[R.place(n)]) for n in R.NAMES}
+        if not any(values[f"muscle.{name}"] for name in MAP_SIZES):
+            values |= UNUSED_MAP
         n = self.plant.elements
         if n:
             operator: Any = self.plant.hysteresis.operator
@@ -268,6 +269,10 @@ class MuscleFamily:
         raise unstable
 
 
+UNUSED_MAP = {
+    f"muscle.{name}": getattr(EffectiveAreaMuscle, name) for name in ("map_pressure", "map_strain")
+}
+"""Range of a map without terms."""
 FINER = (6, 8, 12, 20, 40, 70, 120)
 """Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
 
@@ -280,7 +285,7 @@ def unit_of(plant: SingleMuscle, name: str) -> str:
 
 
 def states_of(contraction: Array, pressure: Array, plant: SingleMuscle) -> Array:
-    """Return mean pressures [Pa] and strains of groups of recorded states, (2, k).
+    """Return mean pressures [Pa] and strains of groups of recorded states, and beside, (2, k).
 
     ``contraction`` [m] and ``pressure`` [Pa] have the shape (T,), NaN where there is no reading.
     """
@@ -293,7 +298,12 @@ def states_of(contraction: Array, pressure: Array, plant: SingleMuscle) -> Array
     levels = np.minimum((found - low[:, None]) // spans, np.reshape(LEVELS, (2, 1)) - 1.0)
     _, group = np.unique(levels[0] * LEVELS[1] + levels[1], return_inverse=True)
     counts = np.bincount(group)
-    return np.array([np.bincount(group, values) / counts for values in found])
+    middle = np.array([np.bincount(group, values) / counts for values in found])
+    steps = np.vstack([np.zeros(2), np.diag(spans[:, 0]), -np.diag(spans[:, 0])])
+    near = (middle[:, None] + steps.T[:, :, None]).reshape(2, -1)
+    near[0] = np.maximum(near[0], 0.0)
+    slack = np.linspace(0.0, REACH * high[1], LEVELS[1])  # where a start looks for its rest
+    return np.hstack([near, [np.zeros(LEVELS[1]), slack]])
 
 
 def spanning(plant: SingleMuscle, states: Array) -> SingleMuscle:

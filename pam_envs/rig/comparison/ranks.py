@@ -31,9 +31,9 @@ class Rank:
     Attributes
     ----------
     value, low, high : float
-        Coefficient and its interval; NaN if one of the sides is constant.
+        Coefficient [1] and its interval; NaN if one of the sides is constant.
     chance : float
-        Probability that a random order agrees at least as well.
+        Probability [1] that a random order agrees at least as well.
     """
 
     value: float

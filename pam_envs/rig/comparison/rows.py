@@ -16,9 +16,9 @@ class Row:
     Attributes
     ----------
     predicted : float
-        Mean of the runs; infinite if a run left the range of contractions.
+        Mean of the runs [unit of the metric]; infinite if a run left the range of contractions.
     low, high : float
-        Prediction interval of one further run.
+        Prediction interval of one further run [unit of the metric].
     """
 
     controller: str
