@@ -18,7 +18,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 SUBSTEPS = 10
 
 
-@njit(cache=True)
+@njit
 def turn(voltage, period, gain, damping, spring, friction, dead_time):
     """Return the angle [rad] at the beginning of each period, from rest."""
     angles, h = np.empty(len(voltage)), period / SUBSTEPS
