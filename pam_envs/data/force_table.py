@@ -60,11 +60,8 @@ def load_force_table(path: str | Path, rig: Rig) -> ForceTable:
     sheet = sheet_of(path, rig.channels, COLUMNS, COLUMNS, "a table of forces")
     found, problems = {}, []
     for name in COLUMNS:
-        values, empty, wrong = sheet.numbers(name)
+        values, wrong = sheet.complete(name)
         problems += wrong
-        if empty.any() and not wrong:
-            at = rows_text(sheet.rows[empty])
-            problems.append(f"column {name} is empty in {at}; fill the cells or leave the rows out")
         found[name] = values * UNITS[name]
     if problems:
         refuse(sheet.where, *problems)

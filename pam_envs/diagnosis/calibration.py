@@ -32,10 +32,10 @@ from pam_envs.diagnosis.fit.single_muscle import (
     THRESHOLDS,
     identified,
     inputs_of,
+    spread,
     unit_of,
 )
 from pam_envs.diagnosis.report.outcome import steps
-from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.identification.force_table import LawFit, fit_law
 from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle.families import FAMILIES, PRESSURE, base_plant
@@ -44,8 +44,6 @@ from pam_envs.plants.single_muscle.replay import CHANNELS, replay_rows
 
 DEAD_TIME = 0.03
 """Starting value of the dead time [s], which the fit moves."""
-SHARE = 0.7
-"""Share of the hysteresis in the start's slope."""
 SAME = 1.01
 """Ratio of errors up to which the first family is taken."""
 LEAST_WEIGHT = 1e-6
@@ -166,9 +164,7 @@ def calibrate(
     """
     with fit_failures_explained(), steps(progress) as step:
         step("checking the data")
-        checked = audit(recording, rig)
-        if checked.problems:
-            raise ValueError("the recording cannot be used: " + " ".join(checked.problems))
+        checked = audit(recording, rig).passed()
         if recording.contraction is None:
             raise ValueError(
                 "the recording has no column contraction_mm, which the muscle is calibrated to; "
@@ -258,15 +254,11 @@ def start(family: str, rig: Rig) -> SingleMuscle:
     """Return the plant from which a fit starts: many elements of friction, a dead time."""
     plant = sized(family, rig)
     rated = plant.regulator.max_pressure / PRESSURE
-    weights = np.full(len(THRESHOLDS), SHARE / len(THRESHOLDS))
-    operator = PlayOperator(
-        tuple(rated * t for t in THRESHOLDS), tuple(weights), 1.0 - float(weights.sum())
-    )
     return plant.replace(
         {
             **PLAIN_NEUTRAL,
             "regulator.dead_time": DEAD_TIME,
-            "hysteresis.operator": operator,
+            "hysteresis.operator": spread([rated * t for t in THRESHOLDS]),
             "mass.load": 0.0,
             "mass.carried": 0.0 if rig.load == "constant_force" else 1.0,
         }

@@ -114,9 +114,7 @@ def diagnose(
     absent = [cause.name for cause in wanted if cause.name not in {c.name for c in asked}]
     with threadpool_limits(1, "blas"), fit_failures_explained(), steps(progress) as step:
         step("checking the data")
-        checked = kind.audit(recording, sheet)
-        if checked.problems:
-            raise ValueError("the recording cannot be used: " + " ".join(checked.problems))
+        checked = kind.audit(recording, sheet).passed()
         floor = noise_floor(recording, sheet)
         step("refitting the plant")
         start = plant if plant is not None else kind.start(sheet)
@@ -343,7 +341,7 @@ class Study:
 
     def find_testable(self, causes: Sequence[Cause], absent: Sequence[str] = ()) -> None:
         """Keep the causes that the recording can show; the plant has none of the ``absent``."""
-        causes, replaced = acting(causes, getattr(self.family, "plant", None))
+        causes, replaced = acting(causes, self.family.plant)
         data = (self.problem, self.family, self.normal.fit, causes, self.recording, self.sheet)
         unmet = self.family.unmet_needs(self.recording, self.sheet)
         self.isolability, self.not_testable = not_testable(*data, unmet)

@@ -11,6 +11,7 @@ from pam_envs import yaml_file
 from pam_envs.data.recording.recording import read_input
 from pam_envs.data.rig_file import Rig
 from pam_envs.plants.single_muscle.plant import SingleMuscle
+from tests.mutation import mutated
 
 PLANT = "schema: 1\nfamily: single_muscle\nparameters: {mass.load: 2.5}\n"
 RIG = "plant: single_muscle\nmuscle: {rest_length_mm: 200}\nrepeats: [[a, b]]\n"
@@ -77,25 +78,6 @@ def crafted_csv() -> Iterator[str]:
         yield RECORDING.replace("time_s", cell)
 
 
-def mutated(text: str, draws: random.Random) -> bytes:
-    """Return a text with bytes changed, removed, doubled or inserted."""
-    data = bytearray(text.encode())
-    for _ in range(draws.randint(1, 4)):
-        at, to = sorted(draws.randrange(len(data) + 1) for _ in range(2))
-        kind = draws.randrange(4)
-        if kind == 0 and at < len(data):
-            data[at] = draws.randrange(256)
-        elif kind == 1:
-            del data[at : min(to, at + 40)]
-        elif kind == 2:
-            data[at:at] = data[at:to] * draws.randint(1, 3)
-        else:
-            data[at:at] = draws.choice(
-                (b"[", b"{", b"&a ", b"*a ", b"!!int ", b"\0", b"9" * 400, b":")
-            )
-    return bytes(data)
-
-
 def check(path: Path, content: bytes) -> None:
     """Assert that a reader returns, or raises one short ValueError with the file's name."""
     path.write_bytes(content)
@@ -125,7 +107,7 @@ def test_crafted_tables_are_refused_by_name(tmp_path: Path) -> None:
 def test_mutated_files_are_read_or_refused_by_name(kind: str, tmp_path: Path) -> None:
     draws = random.Random(0)
     for _ in range(150):
-        check(tmp_path / f"file{kind}", mutated(draws.choice(SEEDS[kind]), draws))
+        check(tmp_path / f"file{kind}", mutated(draws.choice(SEEDS[kind]).encode(), draws))
 
 
 def test_aliases_depth_and_size_are_bounded() -> None:

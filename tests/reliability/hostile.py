@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from tests.mutation import mutated
+
 SECONDS = 5
 MEMORY = 2**30  # bytes beyond those of the process before
 CODE = ("os.system", "subprocess.Popen", "os.exec", "os.posix_spawn", "os.startfile", "os.fork")
@@ -175,24 +177,6 @@ def files(folder: Path, number: int) -> Iterator[tuple[str, int, Counter[Outcome
             return "read"
 
         yield kind.name, len(contents), isolated(len(contents), act)
-
-
-def mutated(data: bytes, draws: random.Random) -> bytes:
-    """Return bytes with some of them changed, removed, doubled or inserted."""
-    made = bytearray(data)
-    for _ in range(draws.randint(1, 4)):
-        at, to = sorted(draws.randrange(len(made) + 1) for _ in range(2))
-        kind = draws.randrange(4)
-        if kind == 0 and at < len(made):
-            made[at] = draws.randrange(256)
-        elif kind == 1:
-            del made[at : min(to, at + 40)]
-        elif kind == 2:
-            made[at:at] = made[at : min(to, at + 4000)] * draws.randint(1, 3)
-        else:
-            words = (b"[", b"{", b"&a ", b"*a ", b"!!int ", b"\0", b"9" * 400, b":", b"null", b'""')
-            made[at:at] = draws.choice(words)
-    return bytes(made)
 
 
 # --- actions, states, checkpoints, cache ---------------------------------------------------------

@@ -109,6 +109,16 @@ class Sheet:
             refuse(self.where, f"column {column} is empty in {rows_text(empty)}; fill the cells")
         return cells
 
+    def complete(self, column: str) -> tuple[Array, list[str]]:
+        """Return a column in the file's unit that has to be complete, and its problems."""
+        values, empty, problems = self.numbers(column)
+        if empty.any() and not problems:
+            at = rows_text(self.rows[empty])
+            return values, [
+                f"column {column} is empty in {at}; fill the cells or leave the rows out"
+            ]
+        return values, problems
+
     def numbers(self, column: str) -> tuple[Array, NDArray[np.bool_], list[str]]:
         """Return a column in the file's unit, its empty cells, and the problems with others.
 

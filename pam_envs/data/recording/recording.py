@@ -405,13 +405,8 @@ def _load_of_plant(path: str | Path, rig: Rig) -> Recording:
     for name in ("time_s", *fields):
         if name not in sheet.cells:
             continue
-        values, empty, wrong = sheet.numbers(name)
+        values, wrong = sheet.complete(name)
         problems += wrong
-        if empty.any() and not wrong:
-            problems.append(
-                f"column {name} is empty in {rows_text(sheet.rows[empty])}; fill the cells or "
-                "leave the rows out"
-            )
         found = fields.get(name)
         columns[found.name if found else "time"] = values * (found.scale if found else 1.0)
     commands = [c for c in wiring.inputs if c.name in wiring.measured]

@@ -38,6 +38,12 @@ class Audit:
     problems: tuple[str, ...]  # reasons against a diagnosis; empty if one can be made
     warnings: tuple[str, ...]  # limitations of the data
 
+    def passed(self) -> "Audit":
+        """Return the audit; ValueError with all problems if there are any."""
+        if self.problems:
+            raise ValueError("the recording cannot be used: " + " ".join(self.problems))
+        return self
+
 
 def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Audit:
     """Return the findings on a recording, or on a table of readings, with rows and remedies."""

@@ -187,7 +187,7 @@ class JointKind:
             given |= {s: one_ahead(recording.outputs[p], recording) for s, p in pairs}
             plant = with_measured_drive(plant, recording.period)
         usual = channels_of(plant) | {"direct": FROM_THEM}
-        names = {"pressure_a": "set_point_a", "pressure_b": "set_point_b"}
+        names = dict(zip(PRESSURES, SET_POINTS, strict=True))
         channels = [
             shut_off(given[names[name]], recording)
             if name in names

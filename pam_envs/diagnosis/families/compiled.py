@@ -13,10 +13,11 @@ from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import MANY_CYCLES, SHUT_SECONDS, longest_shut
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.calibrate import Calibration
+from pam_envs.diagnosis.fit.calibrate import Calibration, start_at_guess
 from pam_envs.diagnosis.fit.candidate import fit_base
 from pam_envs.diagnosis.fit.least_squares import (
     FEW_DAMPINGS,
+    LANES,
     Fit,
     Free,
     Problem,
@@ -24,15 +25,12 @@ from pam_envs.diagnosis.fit.least_squares import (
     evaluate,
     improve,
 )
+from pam_envs.diagnosis.fit.single_muscle import identified
 from pam_envs.hysteresis.protocol import ELEMENTS
-from pam_envs.parameters import Declaration, declarations
-from pam_envs.plants.core.plant import Plant, UnstableParameters
+from pam_envs.parameters import Declaration
+from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.core.rollout import BEGIN, run
 
-TILE = 16
-"""Plants that a tile advances together."""
-FINER = (6, 8, 12, 20, 40, 70, 100)
-"""Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
 WEIGHT = "hysteresis.weight["
 WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
 ROUNDS, VALVE_ROUNDS = 25, 12
@@ -91,7 +89,7 @@ class CompiledFamily:
         flags = np.where(self.fresh, BEGIN, 0).astype(np.int64)
         made = run(
             self.loop, self.plant, columns, self.drives, flags=flags, substeps=substeps,
-            period=self.period, before=True, lanes=TILE, parallel=True,
+            period=self.period, before=True, lanes=LANES, parallel=True,
         )  # fmt: skip
         outputs = np.ascontiguousarray(made[: len(self.channels)].transpose(2, 0, 1))
         return outputs.transpose(1, 2, 0)  # plants apart in memory: residuals are read one by one
@@ -120,8 +118,8 @@ class CompiledFamily:
         """Return the declaration of a free parameter."""
         if name.startswith(WEIGHT):
             return WEIGHTS
-        component, _, entry = name.partition(".")
-        return declarations(getattr(self.plant, component))[entry]
+        found: Declaration = self.plant.declaration(name)
+        return found
 
     def free(self, name: str, **changes: Any) -> Free:
         """Return the fit settings of a parameter; ``changes`` override its declaration."""
@@ -162,18 +160,12 @@ class CompiledFamily:
             weights = tuple(map(float, column[self._weights : self._weights + n]))
             operator = dataclasses.replace(self.plant.hysteresis.operator, weights=weights)
             values["hysteresis.operator"] = operator
-        for substeps in (self.plant.substeps, *FINER):
-            try:
-                made = dataclasses.replace(self.plant, substeps=substeps).replace(values)
-                return dataclasses.replace(made, regulator=self.regulator or made.regulator)
-            except UnstableParameters as error:
-                unstable = error
-        raise unstable
+        made = self.plant.replace_with_substeps(values)
+        return dataclasses.replace(made, regulator=self.regulator or made.regulator)
 
     def identified(self, plant: Any, frees: Iterable[Free], source: str) -> Any:
         """Return a plant with the provenance of its fitted parameters."""
-        found = {f.name: ("identified", source) for f in frees if f.name in plant.names}
-        return dataclasses.replace(plant, provenance={**plant.provenance, **found})
+        return identified(plant, frees, source)
 
     def needs_of_any(self, recording: Recording, sheet: Rig) -> dict[str, tuple[bool, str]]:
         """Return whether a recording meets the needs that all plants have in common, and why."""
@@ -250,9 +242,5 @@ def calibrate_compiled(
         evaluate(only, [fit])
         improve(only, [fit], VALVE_ROUNDS, 1e-4, FEW_DAMPINGS)
         found, column = fit.values(), column_of(fit, fit.z)
-    starts = tuple(
-        dataclasses.replace(f, start=f.within(found[f.name])) if f.name in found else f
-        for f in frees
-    )
-    base = fit_base(problem, blocks, column, [starts], ROUNDS)
+    base = fit_base(problem, blocks, column, [start_at_guess(frees, found)], ROUNDS)
     return Calibration(family, problem, base, found, None)

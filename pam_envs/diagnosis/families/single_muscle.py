@@ -9,6 +9,7 @@ from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import Audit, audit, unmet_needs
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import by_name, catalogue
+from pam_envs.diagnosis.families.compiled import WEIGHTS
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration, calibrate
 from pam_envs.diagnosis.fit.least_squares import Free
@@ -16,7 +17,6 @@ from pam_envs.diagnosis.fit.single_muscle import (
     CLOCK,
     USUAL_ROWS,
     MuscleFamily,
-    declared,
     identified,
     inputs_of,
     start_plant,
@@ -25,7 +25,6 @@ from pam_envs.diagnosis.plant_protocol import Output, Parameter, Signals
 from pam_envs.parameters import Declaration
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-WEIGHT = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
 OFFSET = Declaration("s", -1.0, 1.0, "assumed", "offset of the readings' clock", 0.0)
 
 
@@ -37,9 +36,8 @@ class BoundMuscle(MuscleFamily):
         if name == CLOCK:
             return OFFSET
         if name.startswith("hysteresis.weight"):
-            return WEIGHT
-        found: Declaration = declared(self.plant, name)
-        return found
+            return WEIGHTS
+        return self.plant.declaration(name)
 
     def unmet_needs(self, recording: Recording, sheet: Rig) -> dict[str, str]:
         """Return the needs of causes that a recording does not meet, and why."""

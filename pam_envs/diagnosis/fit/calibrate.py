@@ -30,7 +30,6 @@ from pam_envs.diagnosis.fit.single_muscle import (
     states_of,
 )
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.flow import REPLACED
 
@@ -90,9 +89,7 @@ def calibrate(
         rate = next((r for r in rates if all(t.name in found for t in r.terms)), None)
         if family.plant.air == "regulator" and found[LAG] < FAST:
             family = family.finer(FINE_STEP)
-        problem = dataclasses.replace(
-            problem, simulate=family.simulate, tie=family.tie, violations=family.violations
-        )
+        problem = replayed_by(family, problem)
         column = column_of(fit, fit.z)
     frees = family.base()
     tried: list[tuple[Free, ...]] = [frees]
@@ -106,15 +103,19 @@ def calibrate(
             law, wide = slow.solve(), slow.flexible()
             plant = family.plant.replace({"muscle.braid_strain": slow.braid})
             family = dataclasses.replace(family, plant=plant)
-            column[R.MUSCLE_BRAID_STRAIN] = slow.braid
-            problem = dataclasses.replace(
-                problem, simulate=family.simulate, tie=family.tie, violations=family.violations
-            )
+            problem = replayed_by(family, problem)
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column
     best = fit_base(problem, blocks, plain, tried, ROUNDS)
     return Calibration(family, problem, best, found | law | wide, rate)
+
+
+def replayed_by(family: MuscleFamily, problem: Problem) -> Problem:
+    """Return a problem whose columns are those of a family."""
+    return dataclasses.replace(
+        problem, simulate=family.simulate, tie=family.tie, violations=family.violations
+    )
 
 
 ORDER_GAIN = 0.05

@@ -10,9 +10,8 @@ from typing import Any
 
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.fit.single_muscle import FINER, SWITCHED_OFF, declared
+from pam_envs.diagnosis.fit.single_muscle import SWITCHED_OFF
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.plants.core.plant import UnstableParameters
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.families import PRESSURE, SIZE
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -72,7 +71,7 @@ class Similarity:
         """Return the factor on a parameter by its dotted name."""
         if name in KEPT_NAMES or name in plant.inert or name not in R.NAMES:
             return 1.0
-        return self.factor(declared(plant, name).unit)
+        return self.factor(plant.declaration(name).unit)
 
     def plant(self, plant: SingleMuscle) -> SingleMuscle:
         """Return the similar plant, with as many sub-steps as it needs."""
@@ -98,13 +97,7 @@ class Similarity:
                 f"hysteresis {plant.hysteresis.kind} cannot be calibrated at "
                 f"{plant.regulator.max_pressure / 1e5:g} bar; start from maxwell_slip"
             )
-        plain = dataclasses.replace(plant, ensemble=())
-        for substeps in (plant.substeps, *FINER):
-            try:
-                return dataclasses.replace(plain, substeps=substeps).replace(values)
-            except UnstableParameters as error:
-                unstable = error
-        raise unstable
+        return dataclasses.replace(plant, ensemble=()).replace_with_substeps(values)
 
     def recording(self, recording: Recording) -> Recording:
         """Return the recording of the similar muscle."""

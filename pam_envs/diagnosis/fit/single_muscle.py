@@ -1,10 +1,10 @@
 """Single muscle as a diagnosable plant: recorded inputs, base parameters, parameter columns."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval
@@ -15,15 +15,17 @@ from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.muscle.effective_area import MAP_SIZES, EffectiveAreaMuscle
 from pam_envs.muscle.effects import MAP_TERMS
-from pam_envs.parameters import declarations
-from pam_envs.plants.core.plant import UnstableParameters
+from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import CHANNELS, Inputs, replay_rows
 from pam_envs.pneumatics.flow import SWITCH
 
+P = TypeVar("P", bound=Plant)
 THRESHOLDS = (3e3, 7e3, 1.2e4, 1.8e4, 2.5e4, 3.3e4, 4.2e4, 5.2e4, 6.3e4, 7.6e4, 9.1e4, 1.1e5)
 """Thresholds [Pa] of the base's play operators."""
+SHARE_OF_PLAYS = 0.7
+"""Share of all play operators in the slope, at the start of a fit."""
 LEAST_LINEAR = 0.02
 LEAST_STIFFNESS, LEAST_STIFFNESS_OF, LEAST_GAIN = 1.0, 50.0, 0.1
 """Least stiffness over strain, in parts of 50 N, and least slope of the force by pressure, over the
@@ -99,12 +101,6 @@ SWITCHED_OFF = {
     k: v for k, v in {**SingleMuscle.neutral, **PLAIN_NEUTRAL}.items() if k != "mass.carried"
 }
 """Neutral values of all effects; the rig declares the other parameter."""
-
-
-def declared(plant: SingleMuscle, name: str) -> Any:
-    """Return the declaration of a parameter by its dotted name."""
-    component, _, field = name.partition(".")
-    return declarations(getattr(plant, component))[field]
 
 
 @dataclass(frozen=True)
@@ -220,7 +216,7 @@ class MuscleFamily:
                 low=-self.clock, high=self.clock, scale=0.01, start=0.0, prior=50 * self.clock
             )
             return Free(name, len(self.column) - 1, **{**made, **changes})
-        d, value = declared(self.plant, name), self.plant.value(name)
+        d, value = self.plant.declaration(name), self.plant.value(name)
         made = dict(low=d.low, high=d.high, start=value)
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
         if name in USUAL:
@@ -261,27 +257,20 @@ class MuscleFamily:
             values["hysteresis.operator"] = PlayOperator(
                 operator.thresholds, weights, 1.0 - sum(weights)
             )
-        for substeps in (self.plant.substeps, *FINER):
-            try:
-                return dataclasses.replace(self.plant, substeps=substeps).replace(values)
-            except UnstableParameters as error:
-                unstable = error
-        raise unstable
+        return self.plant.replace_with_substeps(values)
 
 
 UNUSED_MAP = {
     f"muscle.{name}": getattr(EffectiveAreaMuscle, name) for name in ("map_pressure", "map_strain")
 }
 """Range of a map without terms."""
-FINER = (6, 8, 12, 20, 40, 70, 120)
-"""Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
 
 
 def unit_of(plant: SingleMuscle, name: str) -> str:
     """Return the SI unit of a free parameter."""
     if name == CLOCK:
         return "s"
-    return "1" if name.startswith("hysteresis.weight") else declared(plant, name).unit
+    return "1" if name.startswith("hysteresis.weight") else plant.declaration(name).unit
 
 
 def states_of(contraction: Array, pressure: Array, plant: SingleMuscle) -> Array:
@@ -310,26 +299,25 @@ def spanning(plant: SingleMuscle, states: Array) -> SingleMuscle:
     """Return a plant whose map, if it has none yet, spans recorded states (:func:`states_of`)."""
     if plant.muscle.finer or not states.size:
         return plant
-    law, values = (
-        declarations(plant.muscle),
-        {"pressure": states[0].max(), "strain": states[1].max()},
-    )
-    made = {
-        f"muscle.map_{name}": float(
-            np.clip(MARGIN * value, law[f"map_{name}"].low, law[f"map_{name}"].high)
-        )
-        for name, value in values.items()
-    }
+    made = {}
+    for name, end in zip(("muscle.map_pressure", "muscle.map_strain"), states.max(1), strict=True):
+        bounds = plant.declaration(name)
+        made[name] = float(np.clip(MARGIN * end, bounds.low, bounds.high))
     return plant.replace(made)
+
+
+def spread(thresholds: Sequence[float]) -> PlayOperator:
+    """Return play operators of equal weight at thresholds [Pa], where a fit of them starts."""
+    weights = np.full(len(thresholds), SHARE_OF_PLAYS / len(thresholds))
+    return PlayOperator(tuple(thresholds), tuple(weights), 1.0 - float(weights.sum()))
 
 
 def start_plant(rig: Any) -> SingleMuscle:
     """Return the default plant of a rig: the shipped muscle, scaled, without any effect."""
     stock = SingleMuscle.mas10("maxwell_slip")
-    weights = np.full(len(THRESHOLDS), 0.7 / len(THRESHOLDS))
     values: dict[str, Any] = {
         **PLAIN_NEUTRAL,
-        "hysteresis.operator": PlayOperator(THRESHOLDS, tuple(weights), 1.0 - float(weights.sum())),
+        "hysteresis.operator": spread(THRESHOLDS),
         "mass.load": 0.0,
         "muscle.area_taper": 1.0,
         "muscle.braid_strain": 0.03,
@@ -369,9 +357,9 @@ def known_of(rig: Any, values: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
 TAKEN = "assumed by pam-envs diagnose, not fitted"
 
 
-def identified(plant: SingleMuscle, frees: Iterable[Free], source: str) -> SingleMuscle:
+def identified(plant: P, frees: Iterable[Free], source: str) -> P:
     """Return a plant with the provenance of its fitted parameters."""
-    found = {f.name: ("identified", source) for f in frees if f.name in R.NAMES}
+    found = {f.name: ("identified", source) for f in frees if f.name in plant.names}
     return dataclasses.replace(plant, provenance={**plant.provenance, **found})
 
 

@@ -21,7 +21,7 @@ from pam_envs.hysteresis.protocol import (
     tables_of,
 )
 from pam_envs.kernels.motion import LARGEST_PHASE
-from pam_envs.parameters import check, declarations
+from pam_envs.parameters import Declaration, check, declarations
 from pam_envs.plants.core import plant_file
 from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.pneumatics.flow import AIRS, REPLACED, SWITCH, FlowEffects
@@ -33,6 +33,10 @@ LAG_ALONE = {"regulator.dead_time": 0.0, "regulator.slew_rate": NO_SLEW_LIMIT}
 
 class UnstableParameters(ValueError):
     """Parameters whose motion the sub-steps cannot follow."""
+
+
+FINER = (6, 8, 12, 20, 40, 70, 100)
+"""Numbers of sub-steps tried where those of a plant cannot follow its motion."""
 
 
 @dataclass(frozen=True)
@@ -228,6 +232,26 @@ class Plant:
             c: dataclasses.replace(getattr(self, c), **v) for c, v in changed.items()
         }
         return dataclasses.replace(self, **parts)
+
+    def replace_with_substeps(self, values: Mapping[str, Any]) -> Self:
+        """Return :meth:`replace` with as many sub-steps as the motion needs.
+
+        Raises
+        ------
+        UnstableParameters
+            If the motion is too fast for the largest number.
+        """
+        for substeps in (self.substeps, *FINER):
+            try:
+                return dataclasses.replace(self, substeps=substeps).replace(values)
+            except UnstableParameters as error:
+                unstable = error
+        raise unstable
+
+    def declaration(self, name: str) -> Declaration:
+        """Return the declaration of a parameter by dotted name."""
+        component, _, entry = name.partition(".")
+        return declarations(getattr(self, component))[entry]
 
     def changed(self, changes: Mapping[str, float]) -> Self:
         """Return :meth:`replace` of keyword arguments, with ``__`` for the dot (``mass__load``)."""

@@ -27,7 +27,7 @@ import yaml
 from pam_envs import yaml_file
 from pam_envs.files import write_text
 from pam_envs.hysteresis import protocol
-from pam_envs.parameters import PROVENANCES, Declaration, declarations
+from pam_envs.parameters import PROVENANCES, declarations
 from pam_envs.wording import shown
 
 if TYPE_CHECKING:
@@ -78,15 +78,10 @@ def _absent(plant: Plant) -> set[str]:
     """Return the parameters of effects that are off, which a file need not name."""
     absent = set()
     for names in plant.effects:
-        amounts = [n for n in names if _declared(plant, n).neutral is not None]
-        if all(plant.value(n) == _declared(plant, n).neutral for n in amounts):
+        amounts = [n for n in names if plant.declaration(n).neutral is not None]
+        if all(plant.value(n) == plant.declaration(n).neutral for n in amounts):
             absent |= set(names)
     return absent
-
-
-def _declared(plant: Plant, name: str) -> Declaration:
-    component, _, field = name.partition(".")
-    return declarations(getattr(plant, component))[field]
 
 
 def digest(plant: Plant) -> str:

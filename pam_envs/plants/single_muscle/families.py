@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.plants.core.plant import UnstableParameters
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 SIZE, PRESSURE = 0.01, 6e5
@@ -98,24 +97,8 @@ def base_plant(
             ("assumed", "given, or scaled to the muscle's size"),
         ),
     }
-    return stable(stock, {**law, **sizes}, provenance)
-
-
-def stable(
-    stock: SingleMuscle, values: Mapping[str, Any], provenance: Mapping[str, tuple[str, str]]
-) -> SingleMuscle:
-    """Return a plant with as many sub-steps as its motion needs."""
-    made = dataclasses.replace(stock, ensemble=(), provenance=dict(provenance))
-    for substeps in (stock.substeps, *FINER):
-        try:
-            return dataclasses.replace(made, substeps=substeps).replace(values)
-        except UnstableParameters as error:
-            unstable = error
-    raise unstable
-
-
-FINER = (6, 8, 12, 20, 40, 70, 100)
-"""Numbers of sub-steps that are tried for a fast motion."""
+    made = dataclasses.replace(stock, ensemble=(), provenance=provenance)
+    return made.replace_with_substeps({**law, **sizes})
 
 
 def _mas(stock: SingleMuscle, diameter: float, angle: float, wide: float) -> dict[str, float]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pam_envs.diagnosis.cause import NEEDS, Cause, Form, Term
 from pam_envs.diagnosis.causes import FOLDER, catalogue
-from pam_envs.diagnosis.fit.single_muscle import BASE, declared
+from pam_envs.diagnosis.fit.single_muscle import BASE
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
@@ -92,7 +92,7 @@ def limits(name: str) -> tuple[str, float, float, float | None]:
     """Return unit, bounds and neutral value."""
     if name == WEIGHT:
         return "1", 0.0, 1.0, None
-    d = declared(PLANT, name)
+    d = PLANT.declaration(name)
     return d.unit, d.low, d.high, d.neutral
 
 

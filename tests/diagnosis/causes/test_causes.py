@@ -11,7 +11,7 @@ from pam_envs.diagnosis import causes as package
 from pam_envs.diagnosis.cause import NEEDS
 from pam_envs.diagnosis.causes import by_name, catalogue, selected
 from pam_envs.diagnosis.fit.candidate import frees_for
-from pam_envs.diagnosis.fit.single_muscle import BASE, MuscleFamily, declared, start_plant
+from pam_envs.diagnosis.fit.single_muscle import BASE, MuscleFamily, start_plant
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import Inputs, replay
@@ -82,7 +82,7 @@ def started(form, **amounts):
 
 def neutral(form):
     """Return the values that switch a form off; parameters that only shape it are kept."""
-    return {t.name: declared(PLANT, t.name).neutral for t in form.terms if t.amount}
+    return {t.name: PLANT.declaration(t.name).neutral for t in form.terms if t.amount}
 
 
 def differences(first, second):
@@ -159,7 +159,7 @@ def test_requirements_of_causes_have_words():
 
 @pytest.mark.parametrize(("form", "term"), TERMS)
 def test_starting_values_are_within_bounds(form, term):
-    d = declared(PLANT, term.name)
+    d = PLANT.declaration(term.name)
     low = d.low if term.low is None else term.low
     high = d.high if term.high is None else term.high
     assert d.low <= low < high <= d.high

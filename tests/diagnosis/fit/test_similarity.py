@@ -5,7 +5,7 @@ import pytest
 
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.fit.similarity import EXPONENTS, Similarity
-from pam_envs.diagnosis.fit.single_muscle import declared, start_plant
+from pam_envs.diagnosis.fit.single_muscle import start_plant
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.families import base_plant
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -29,7 +29,7 @@ EFFECTS = {
 
 def test_every_unit_of_the_plant_has_its_exponents():
     plant = SingleMuscle()
-    assert {declared(plant, name).unit for name in R.NAMES} <= set(EXPONENTS)
+    assert {plant.declaration(name).unit for name in R.NAMES} <= set(EXPONENTS)
 
 
 @pytest.mark.parametrize(("diameter", "full"), [(0.003, 3e5), (0.03, 1.5e4), (0.05, 6e5)])
@@ -37,10 +37,10 @@ def test_similar_muscle_moves_alike(diameter, full):
     plant = base_plant("mckibben", 0.15, diameter, max_pressure=full)
     wide = (diameter / 0.003) ** 2 * full / 3e5
     effects = {
-        name: value * (wide if declared(plant, name).unit in ("N", "N s/m") else 1.0)
+        name: value * (wide if plant.declaration(name).unit in ("N", "N s/m") else 1.0)
         for name, value in EFFECTS.items()
     }
-    effects |= {n: EFFECTS[n] * full / 3e5 for n in EFFECTS if declared(plant, n).unit == "Pa"}
+    effects |= {n: EFFECTS[n] * full / 3e5 for n in EFFECTS if plant.declaration(n).unit == "Pa"}
     plant = plant.replace(effects)
     similar = Similarity.of(plant)
     alike = similar.plant(plant)
