@@ -70,8 +70,7 @@ def made(family, diameter, length, full, loads) -> tuple[SingleMuscle, Recording
 
 
 MISSED = pytest.mark.xfail(
-    reason="known defect: held-out contraction 2.7 times the noise since the law is checked near "
-    "recorded states alone"
+    reason="known defect, cause not isolated: held-out contraction 2.7 times the noise"
 )
 
 
