@@ -55,7 +55,7 @@ class Signals:
     label : str
         Name and unit of the driving signal in figures, of a plant whose outputs do not hold it.
     scale : float
-        Size of that unit in the driving signal.
+        Size of that unit in the driving signal [Pa].
     """
 
     drive: str

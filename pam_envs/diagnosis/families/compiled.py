@@ -52,7 +52,7 @@ class CompiledFamily:
     period : float
         Sampling period [s].
     drives : ndarray, shape (channels, T, 1)
-        Inputs in the order of the family's loop.
+        Inputs [SI] in the order of the family's loop.
     fresh : ndarray of bool, shape (T,)
         Samples at which the plant restarts from rest.
     regulator : object or None

@@ -39,15 +39,16 @@ class Quantity:
     Attributes
     ----------
     value : float
-        Starting value; of an effect the one that switches it off.
+        Starting value [SI]; of an effect the one that switches it off.
     unit : str
         In SI.
     low, high : float
-        Bounds within which the parameter is physical.
+        Bounds [SI] within which the parameter is physical.
     effect : bool
         Whether it belongs to a cause; all others are refitted in every model.
     scale : float, optional
-        Size of a meaningful change; default: a tenth of the value, or a thousandth of the bounds.
+        Size of a meaningful change [SI]; default: a tenth of the value, or a thousandth of the
+        bounds.
     log : bool
         Whether it is fitted on a logarithmic scale.
     """
