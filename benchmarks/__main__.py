@@ -157,7 +157,8 @@ def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
     """
     from benchmarks.board import site as pages
 
-    written = pages.build(results, pages.OUT if out is None else out)
+    with progress("tracks") as start:
+        written = pages.build(results, pages.OUT if out is None else out, start)
     print(f"{len(written)} files; open {written[0]}")
     return 0
 
@@ -280,7 +281,8 @@ def papers(
     from benchmarks.papers.published import table
     from benchmarks.runs.store import write_record
 
-    figures = all_figures(paper, place)
+    with progress("groups of figures") as start:
+        figures = all_figures(paper, place, start)
     print(table(figures))
     if not paper and not place:
         print(f"\n{summary(figures)}")
