@@ -68,6 +68,7 @@ audit: $(READY) ## Look up known vulnerabilities of the pinned packages
 images: $(READY) ## Draw the pictures of the documentation
 	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --reference staircase --load 2.55 --episode-seconds 40 --plot docs/images/muscle_positioning.png
 	$(BIN)/python docs/make_images.py
+	$(BIN)/pam-envs render KneeWalk --seconds 5 --fps 10 --video docs/images/knee_walk.gif
 
 $(VENV)/.docs: $(READY)
 	@$(INSTALL) --editable ".[docs]" --constraint constraints.txt

@@ -97,7 +97,7 @@ def test_implicit_q_learning_prefers_rewarded_actions(rewarded):
     data, matrix = one_step(rewarded), ((1.0, 0.0), (0.0, 1.0))
     chosen = {}
     for algo in ("bc", "iql"):
-        network = learn(data, matrix, dataclasses.replace(QUICK, algo=algo, steps=500))
+        network = learn(data, matrix, dataclasses.replace(QUICK, algo=algo, steps=1000))
         with torch.no_grad():
             chosen[algo] = network(torch.from_numpy(data.observations)).numpy().mean()
     assert abs(chosen["bc"]) < 0.1  # the mean of the data
