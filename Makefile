@@ -5,7 +5,7 @@ JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-EXTRAS := plot,data,baselines,agents,bench,export,rig,cluster,dev
+EXTRAS := plot,data,formats,baselines,agents,bench,export,rig,cluster,dev
 INSTALL := $(BIN)/python -m pip --disable-pip-version-check --no-input install -qq
 PLAIN := tests/hysteresis tests/kernels tests/plants/test_golden_plants.py $(addprefix tests/envs/, core/test_bits.py core/test_everyday.py core/test_own_family.py test_golden_trajectories.py)
 
@@ -16,7 +16,7 @@ export SDL_VIDEODRIVER ?= dummy
 
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help venv benchmark test lint format types layers check audit images docs docs-check wheel install-check clean
+.PHONY: help venv benchmark test lint format types layers check audit licences images docs docs-check wheel install-check clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
@@ -62,8 +62,11 @@ layers: $(READY) ## Check which way imports run
 check: lint types layers test ## All of the above checks
 
 audit: $(READY) ## Look up known vulnerabilities of the pinned packages
-	@$(INSTALL) pip-audit
-	$(BIN)/pip-audit --no-deps --disable-pip --requirement constraints.txt
+	@$(INSTALL) pip-audit || { echo "make audit needs the network, to install pip-audit" >&2; exit 1; }
+	$(BIN)/pip-audit --progress-spinner off --no-deps --disable-pip --requirement constraints.txt
+
+licences: $(READY) ## Write the licences of the pinned packages into docs/licences.md
+	$(BIN)/python docs/make_licences.py
 
 images: $(READY) ## Draw the pictures of the documentation
 	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --reference staircase --load 2.55 --episode-seconds 40 --plot docs/images/muscle_positioning.png

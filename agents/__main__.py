@@ -14,6 +14,7 @@ from agents.settings import presets as configs
 from agents.settings.schema import SettingsError
 from pam_envs.envs.registration import full_id
 from sweeps.command_line import run_cli
+from sweeps.files import database_named
 
 ID_HELP = "Environment id, with or without PAM/."
 Env = Annotated[str, tyro.conf.Positional, tyro.conf.arg(help=ID_HELP)]
@@ -50,8 +51,8 @@ def train(
     Args:
         seed: Seed of weights, exploration and episodes; default: 0.
         out: Folder of the run; default: runs/ENV/ALGO-seedSEED.
-        resume: Continue the run in that folder with its settings; only --steps may change. Before
-            its first checkpoint, it starts again with the settings of this command.
+        resume: Continue the run in that folder with its settings; only --steps may change. A run
+            that ended before its first checkpoint starts again, with the settings of this command.
         config: YAML file or policy.onnx whose settings replace the preset.
     """
     from agents.training import sweep as sweeping
@@ -77,8 +78,11 @@ def train(
         training.saved_run(folder)  # raises
     with training.alone(folder):
         if resume and not (folder / CHECKPOINT).exists():
-            console.print(f"{folder} has no checkpoint yet: the training starts again")
             run, resume = fresh(), False
+            console.print(
+                f"{folder} has no checkpoint yet: the training starts again, with the settings of "
+                f"this command: {run.command()}"
+            )
         if resume:
             run = training.saved_run(folder, steps)
             if config is not None or set:
@@ -322,8 +326,9 @@ def tune(
     config = configs.read(path)
     place = storage or Path("runs/tune") / f"{path.stem}.db"
     job = tuning.Job(config, trials, steps or config.steps, seed, place)
-    study = tuning.search(job, Console(stderr=True))
-    print(json.dumps({"value": study.best_value, **study.best_params}, indent=1))
+    with database_named(place):
+        study = tuning.search(job, Console(stderr=True))
+        print(json.dumps({"value": study.best_value, **study.best_params}, indent=1))
     if write:
         tuning.write(job, study, path)
         print(path)
@@ -409,7 +414,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         return run_cli(
             lambda: ask(COMMANDS, prog="python -m agents", args=arguments),
-            "interrupted; finished results and checkpoints are kept; the same command continues",
+            "interrupted; finished results and checkpoints are kept; the same command continues, "
+            "for train with --resume",
         )
     except ModuleNotFoundError as error:
         extra = "data" if error.name == "minari" else "agents"

@@ -15,6 +15,7 @@ from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scoring.metrics import shown
 from pam_envs.envs.registration import full_id
 from sweeps.command_line import run_cli
+from sweeps.files import database_named
 from sweeps.progress import progress
 
 Computing = Annotated[runner.Computing, arg(name="")]
@@ -139,11 +140,13 @@ def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
 
     Args:
         results: Folder of the rows.
-        out: File of the board; the pages go to the folder leaderboard beside it.
+        out: File of the board; the pages go to the folder leaderboard beside it. Default:
+            benchmarks/LEADERBOARD.md, or LEADERBOARD.md in another folder of rows.
     """
     from benchmarks.board import leaderboard
 
-    for path in leaderboard.write(results, leaderboard.BOARD if out is None else out):
+    own = leaderboard.BOARD if results == rows.RESULTS else results / leaderboard.BOARD.name
+    for path in leaderboard.write(results, own if out is None else out):
         print(path)
     return 0
 
@@ -153,12 +156,13 @@ def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
 
     Args:
         results: Folder of the rows.
-        out: Folder of the page, benchmarks/site by default.
+        out: Folder of the page. Default: benchmarks/site, or site in another folder of rows.
     """
     from benchmarks.board import site as pages
 
+    own = pages.OUT if results == rows.RESULTS else results / pages.OUT.name
     with progress("tracks") as start:
-        written = pages.build(results, pages.OUT if out is None else out, start)
+        written = pages.build(results, own if out is None else out, start)
     print(f"{len(written)} files; open {written[0]}")
     return 0
 
@@ -170,21 +174,27 @@ def verify(
 ) -> int:
     """Compute rows again and compare; exit code 1 if one is not reproduced.
 
+    First the audit rounds are compared with those of all earlier commits, which may not change.
     A row must be reproduced to the last bit, or within rounding if it was made with other packages
-    or on another processor. The result is stored in verified.json beside the rows.
+    or on another processor. The result is stored in verified.json beside the rows of this
+    checkout; for other rows nothing is written.
 
     Args:
         row: Files or names of rows.
         all: Every row of benchmarks/results.
     """
     from benchmarks import console
+    from benchmarks.identity import audit as auditing
     from benchmarks.runs import verified
     from benchmarks.runs import verify as checking
 
+    if altered := auditing.altered():
+        raise ValueError("; ".join(altered))
     verdicts = []
     for path in _row_paths(row, all):
         found = checking.verify(path, options.cluster)
-        verified.note(path, found.checksum if found.holds else "", found.mode)
+        if path.resolve().parents[1] == rows.RESULTS.resolve():
+            verified.note(path, found.checksum if found.holds else "", found.mode)
         console.verdict(found)
         verdicts.append(found)
     if len(verdicts) > 1:
@@ -225,7 +235,14 @@ def _row_paths(names: tuple[str, ...], all: bool | None = None) -> list[Path]:
 
 def _row_path(name: str) -> Path:
     given = Path(name)
-    path = given if given.is_file() else rows.path_of(name)
+    if given.is_file() and name.endswith(rows.SUFFIX):
+        return given
+    if not rows.is_name(name):
+        raise ValueError(
+            f"{name!r} is neither a file TRACK/CONTROLLER{rows.SUFFIX} nor a name "
+            "TRACK--CONTROLLER of letters, digits and _"
+        )
+    path = rows.path_of(name)
     if not path.is_file():
         raise ValueError(f"there is no row {name!r}; its file would be {path}")
     return path
@@ -257,7 +274,7 @@ def tune(
     more = {} if storage is None else {"storage": storage}
     job = tuning.job_of(controller, env, trials=trials, seed=seed, episodes=episodes, **more)
     course = tuning.Course(controller, tuning.nominal_track(job.env), episodes)
-    with progress("trials") as start:
+    with database_named(job.storage), progress("trials") as start:
         found = tuning.search(job, course.measure, start)
     print(tuning.sentence(found))
     if write:
@@ -641,7 +658,8 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ.setdefault("PAM_ENVS_COMPILE", "wait")  # rates are of machine code
     return run_cli(
         lambda: ask(COMMANDS, prog="python -m benchmarks", args=arguments),
-        "interrupted; completed work is kept: the same command resumes",
+        "interrupted; no file is half-written; completed cells, cases and trials are kept, and the "
+        "same command resumes",
     )
 
 

@@ -14,6 +14,7 @@ from baselines.emission.catalogue import controller_model
 from benchmarks.runs import controllers
 from pam_envs.export import command
 from pam_envs.export.model import Model
+from pam_envs.files import write_text
 
 
 def made_for(
@@ -63,8 +64,7 @@ def write(
     made, env = made_for(name, env_id, plant, si, training_seed)
     if target == "st":
         text = structured_text.function_block(name, made, env.signals, env.action_signals)
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / f"{name}.st").write_text(text, encoding="utf-8")
+        write_text(folder / f"{name}.st", text)
         return hashlib.sha256(text.encode()).hexdigest()
     model = model_of(name, made, env)
     command.export(model, target, folder)  # type: ignore[arg-type]

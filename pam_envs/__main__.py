@@ -185,18 +185,19 @@ def diagnose(
         recording, shipped = example.recording_and_rig()
         rig = shipped if rig is None else rig
     declared = Rig() if rig is None else Rig.from_yaml(rig)
+    if declared.plant != Rig().plant:
+        from pam_envs.diagnosis.families.kinds import kind_named
+
+        kind_named(declared.plant)  # before the columns of another plant are refused
     data = read_input(recording, declared)
     if isinstance(data, Recording):
-        from pam_envs.diagnosis.causes import catalogue, causes_in
+        from pam_envs.diagnosis.causes import causes_in
         from pam_envs.diagnosis.diagnosis import diagnose as run
-        from pam_envs.plants.single_muscle.plant import SingleMuscle
+        from pam_envs.diagnosis.families.kinds import kind_named
 
-        if declared.plant != SingleMuscle.family:
-            raise ValueError(
-                f"plant: {declared.plant!r} cannot be diagnosed; there is: {SingleMuscle.family}"
-            )
-        model = None if plant is None else SingleMuscle.from_yaml(plant)
-        every = (*catalogue(), *(causes_in(causes) if causes else ()))
+        kind = kind_named(declared.plant)
+        model = None if plant is None else type(kind.start(declared)).from_yaml(plant)
+        every = (*kind.catalogue, *(causes_in(causes) if causes else ()))
         found = run(data, model, rig=declared, causes=every, seed=seed, progress=not quiet)
         print(f"{found.verdict}: {found.text}")
         for warning in found.report["warnings"]:
@@ -211,6 +212,60 @@ def diagnose(
         report = diagnose_readings(data, seed=seed)
         print(f"{report['verdict']}: {report['text']}")
         write(SimpleNamespace(report=report, traces=None, plant=None), out)
+    print(f"wrote {out}")
+
+
+def calibrate(
+    recording: tyro.conf.Positional[Path],
+    rig: Path,
+    out: Path = Path("plant.yaml"),
+    plant: Path | None = None,
+    seed: int = 0,
+    quiet: bool = False,
+) -> None:
+    """Calibrate a base plant for a muscle from a recording or a table of forces.
+
+    Parameters
+    ----------
+    recording : Path
+        Recording in time, or table of static forces (docs/base_plant.md).
+    rig : Path
+        YAML file with the size of the muscle and other known properties of the rig.
+    out : Path
+        Plant file to write.
+    plant : Path
+        Plant file to start from; default: the family of muscles of the rig file, or the nearest.
+    seed : int
+        Seed of all random draws.
+    quiet : bool
+        Show no progress.
+    """
+    from pam_envs.data.force_table import is_force_table, load_force_table
+    from pam_envs.data.recording.recording import Recording, read_input
+    from pam_envs.data.rig_file import Rig
+    from pam_envs.diagnosis import calibration
+    from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+    declared = Rig.from_yaml(rig)
+    if declared.plant != SingleMuscle.family:
+        raise ValueError(
+            f"plant: {declared.plant!r} cannot be calibrated; there is: {SingleMuscle.family}"
+        )
+    if out.is_dir():
+        raise ValueError(f"{out} is a folder; give the name of the plant file, --out plant.yaml")
+    if is_force_table(recording, declared):
+        found = calibration.calibrate_forces(load_force_table(recording, declared), declared)
+    else:
+        data = read_input(recording, declared)
+        if not isinstance(data, Recording):
+            raise ValueError(
+                f"{recording} is a table of settled readings, which shows no force; give a "
+                "recording in time, or a table of pressure_bar, contraction_mm and force_N"
+            )
+        start = None if plant is None else SingleMuscle.from_yaml(plant)
+        found = calibration.calibrate(data, declared, start, seed=seed, progress=not quiet)
+    found.write(out)
+    print(found.summary())
     print(f"wrote {out}")
 
 
@@ -291,6 +346,65 @@ def warmup(
         print(f"{line}: {seconds:.1f} s", flush=True)
 
 
+def compare_rig(
+    table: tyro.conf.Positional[Path],
+    plant: Path,
+    model: Path | None = None,
+    reference: Path | None = None,
+    holds: int = 60,
+    hold_seconds: float = 4.0,
+    range_mm: tuple[float, float] | None = None,
+    settled_seconds: float = 1.0,
+    runs: int = 8,
+    seed: int = 0,
+    out: Path | None = None,
+) -> None:
+    """Compare measured closed-loop figures of a rig with those that a plant predicts.
+
+    Parameters
+    ----------
+    table : Path
+        CSV file of measured figures: controller, load_kg, rms_mm, ... (docs/rig_comparison.md).
+    plant : Path
+        Plant file of the rig, for example a calibrated one.
+    model : Path
+        Plant file from which the controllers are designed; default: the plant.
+    reference : Path
+        CSV file of the reference on the rig: time_s, reference_mm; default: random holds.
+    holds : int
+        Number of random holds of each run; give as many as on the rig.
+    hold_seconds : float
+        Duration of a hold [s].
+    range_mm : (float, float)
+        Lowest and highest level of the holds [mm]; default: 10 to 90 % of the plant's reach.
+    settled_seconds : float
+        Time at the end of each hold that counts as settled, for bias_mm [s].
+    runs : int
+        Number of simulated runs of each line.
+    seed : int
+        Seed of the first run.
+    out : Path
+        Folder for comparison.json and comparison.png.
+    """
+    from pam_envs.plants.single_muscle.plant import SingleMuscle
+    from pam_envs.rig.comparison import table as tables
+    from pam_envs.rig.comparison.comparison import compare
+    from pam_envs.rig.comparison.prediction import Settings
+    from pam_envs.rig.comparison.references import Holds
+
+    simulated = SingleMuscle.from_yaml(plant)
+    nominal = simulated if model is None else SingleMuscle.from_yaml(model)
+    span = None if range_mm is None else (1e-3 * range_mm[0], 1e-3 * range_mm[1])
+    given = Holds(holds, hold_seconds, span)
+    settings = Settings(simulated, nominal, given, settled_seconds, runs, seed)
+    measured = tables.read(table, simulated.mass.load, reference)
+    found = compare(settings, measured, lambda line: print(line, file=sys.stderr, flush=True))
+    print(found.table())
+    print(found.text)
+    for path in () if out is None else found.write(out):
+        print(f"wrote {path}")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     register_all()
@@ -299,7 +413,9 @@ def main(arguments: list[str] | None = None) -> int:
         "render": render,
         "identify": identify,
         "diagnose": diagnose,
+        "calibrate": calibrate,
         "reveal": reveal,
+        "compare-rig": compare_rig,
         "export": export,
         "warmup": warmup,
         "doctor": doctor,
@@ -324,7 +440,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"pam-envs: {printable(str(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("pam-envs: interrupted; nothing was written", file=sys.stderr)
+        print("pam-envs: interrupted; no file is half-written", file=sys.stderr)
         return 130
     return int(status or 0)
 

@@ -20,7 +20,7 @@ from pam_envs.wording import package
 
 ENVIRONMENT = "PAM/MusclePositioning-v0"
 CORE = ("numpy", "scipy", "numba", "llvmlite", "gymnasium")
-USER_EXTRAS = ("plot", "data", "baselines", "agents", "export", "rig")
+USER_EXTRAS = ("plot", "data", "formats", "baselines", "agents", "export", "rig")
 REQUIREMENT = re.compile(r"([\w.-]+)[^;]*;.*extra == ['\"](\w+)['\"]")
 STEPS = 5  # compared between plain Python and machine code
 

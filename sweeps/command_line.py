@@ -2,11 +2,13 @@
 
 import os
 import sys
+import threading
 from collections.abc import Callable
 
 
 def run_cli(command: Callable[[], int | None], interrupted: str) -> int:
     """Run a command and return its exit code, 0 for None; an error of the user is one sentence."""
+    threading.excepthook = _in_thread
     try:
         status = command()
         sys.stdout.flush()
@@ -23,6 +25,14 @@ def run_cli(command: Callable[[], int | None], interrupted: str) -> int:
     except KeyboardInterrupt:
         return _fail(interrupted, 130)
     return int(status or 0)
+
+
+def _in_thread(given: threading.ExceptHookArgs) -> None:
+    """Report a full disk in a thread, such as that of a log, in a sentence."""
+    if isinstance(given.exc_value, OSError):
+        _fail(f"error: {given.exc_value}", 2)
+    else:
+        threading.__excepthook__(given)
 
 
 def _fail(message: str, status: int) -> int:

@@ -1,34 +1,12 @@
-"""Files: written atomically, and their digests."""
+"""Digests of source files, and errors of database files."""
 
+import errno
 import hashlib
-import os
-import socket
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 SOURCES = {".py", ".yaml", ".yml", ".csv", ".json", ".npz", ".onnx", ".safetensors"}
-TEMPORARY = ".tmp"  # suffix of files that are being written
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """Replace a file atomically: a reader finds the old bytes or the new ones, never a part."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.parent / f".{path.name}.{socket.gethostname()}.{os.getpid()}{TEMPORARY}"
-    try:
-        with open(temporary, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:  # a full disk names no file
-        raise OSError(error.errno, error.strerror, str(path)) from error
-    finally:
-        temporary.unlink(missing_ok=True)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
 
 
 def sources_digest(paths: Iterable[Path], kinds: Collection[str] = SOURCES) -> str:
@@ -41,3 +19,16 @@ def sources_digest(paths: Iterable[Path], kinds: Collection[str] = SOURCES) -> s
                 state.update(file.relative_to(root.parent).as_posix().encode())
                 state.update(file.read_bytes())
     return state.hexdigest()[:16]
+
+
+@contextmanager
+def database_named(path: Path) -> Iterator[None]:
+    """Turn an error of the database in a file, as of a full disk, into an OSError that names it."""
+    try:
+        yield
+    except Exception as error:
+        for cause in (error, error.__cause__, error.__context__):
+            if type(cause).__module__.startswith(("sqlalchemy.", "sqlite3")):
+                reason = str(getattr(cause, "orig", cause))
+                raise OSError(errno.EIO, reason, str(path)) from error
+        raise

@@ -15,8 +15,8 @@ from typing import Any
 import onnx
 import onnx.shape_inference
 
+from pam_envs.files import write_bytes
 from pam_envs.wording import shown
-from sweeps.files import write_bytes
 
 POLICY, RECORD = "policy.onnx", "policy.json"  # files of a finished run
 MOST_BYTES = 5_000_000

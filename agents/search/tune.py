@@ -34,6 +34,7 @@ from agents.settings.schema import SettingsError
 from agents.training.building import make_env, make_model
 from agents.training.callbacks import PeriodicCallback, WarmUp, score_of
 from agents.training.evaluation import value_of
+from pam_envs.files import write_text
 
 HEARTBEAT = 60
 """Heartbeat interval of a trial [s]; a trial is repeated after three missed heartbeats."""
@@ -195,7 +196,7 @@ def write(job: Job, study: optuna.Study, path: Path) -> Config:
         raise SettingsError(
             f"{path.name} has a layout that this cannot edit; change it by hand: {changes}"
         )
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
     return preset
 
 

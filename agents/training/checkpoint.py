@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from sweeps.files import TEMPORARY, write_bytes
+from pam_envs.files import TEMPORARY, write_bytes
 
 MARK = b"PAMCKPT1"
 

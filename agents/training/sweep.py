@@ -13,8 +13,8 @@ from filelock import FileLock
 from agents.policies.policy_file import POLICY, RECORD, finished
 from agents.settings.presets import Config
 from agents.training.record import LOCK, Run
+from pam_envs.files import write_bytes
 from sweeps import engine
-from sweeps.files import write_bytes
 
 LOG = "log.txt"
 

@@ -105,6 +105,22 @@ def resume(run: Run) -> BaseAlgorithm:
 
 def train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
     """Train to the end of the run, write its policy and return the policy's path."""
+    with _naming(run.folder):
+        return _train(run, model, console)
+
+
+@contextmanager
+def _naming(folder: Path) -> Iterator[None]:
+    """Name the folder in an OSError of the log, which names no file where the disk is full."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None or error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, str(folder)) from error
+
+
+def _train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
     sinks = ["tensorboard"] if find_spec("tensorboard") else []
     model.set_logger(configure(str(run.folder / "tensorboard"), sinks))
     clock, evaluations = _so_far(run, model)

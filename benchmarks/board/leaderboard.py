@@ -1,7 +1,9 @@
 """The board's files: a pure function of the rows, with equal bytes for equal rows."""
 
+import html
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from benchmarks.board import accessors as views
 from benchmarks.board import plots, standings
@@ -12,7 +14,8 @@ from benchmarks.board.words import Cells, by_controller, short_env
 from benchmarks.identity import audit
 from benchmarks.runs import rows, verified
 from benchmarks.runs.rows import Row
-from benchmarks.runs.store import write_all
+from benchmarks.runs.store import write_folder
+from pam_envs.files import write_text
 
 BOARD = Path(__file__).parents[1] / "LEADERBOARD.md"
 PAGES = "leaderboard"  # folder of the pages beside the board, with the figures and the times
@@ -22,7 +25,7 @@ def load(folder: Path) -> list[Row]:
     """Return the rows of a folder with their verifications and their place in the last round."""
     if not folder.is_dir():
         raise ValueError(f"{folder}: no such folder of rows; run `python -m benchmarks run` first")
-    found = verified.read(folder)
+    found = verified.committed(folder)
     loaded = []
     for row in rows.load_all(folder):  # without an audit if it is not of the last round
         last = audit.last(views.track_of(row)) if audit.in_last_round(row) else None
@@ -33,6 +36,7 @@ def load(folder: Path) -> list[Row]:
 
 def files(all_rows: Sequence[Row]) -> dict[str, str]:
     """Return the texts of the board's files by their paths beside the board, the board first."""
+    all_rows = [_escaped(row) for row in all_rows]
     tracks = standings.tracks(all_rows)
     grouped = standings.by_env(tracks)
     pages = {env: f"{PAGES}/{short_env(env)}.md" for env in grouped}
@@ -47,11 +51,23 @@ def files(all_rows: Sequence[Row]) -> dict[str, str]:
     return texts
 
 
+def _escaped(value: Any) -> Any:
+    """Return nested values with every text as plain text of Markdown, without HTML."""
+    if isinstance(value, str):
+        return html.escape(value, quote=False)
+    if isinstance(value, dict):
+        return {key: _escaped(entry) for key, entry in value.items()}
+    return [_escaped(entry) for entry in value] if isinstance(value, list) else value
+
+
 def write(folder: Path = rows.RESULTS, board: Path = BOARD) -> list[Path]:
     """Write the board, its pages, figures and times in place of earlier ones; return paths."""
     texts = files(load(folder))
-    named = {board.name if name == BOARD.name else name: text for name, text in texts.items()}
-    return write_all(board.parent, named, (f"{PAGES}/*.md", f"{PAGES}/figures/*.svg"))
+    first = texts.pop(BOARD.name)
+    pages = {name.removeprefix(f"{PAGES}/"): text for name, text in texts.items()}
+    written = write_folder(board.parent / PAGES, pages)
+    write_text(board, first)
+    return [board, *written]
 
 
 def times_text(all_rows: Sequence[Row]) -> str:

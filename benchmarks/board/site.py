@@ -17,7 +17,7 @@ from benchmarks.identity.hashing import plain
 from benchmarks.runs import rows
 from benchmarks.runs.cells import PUBLIC
 from benchmarks.runs.rows import Row
-from benchmarks.runs.store import CHECKSUM, read_json, write_all
+from benchmarks.runs.store import CHECKSUM, read_json, write_folder
 from benchmarks.scoring.group import Column
 from benchmarks.scoring.metrics import COSTS, columns_of
 from benchmarks.scoring.statistics import Interval
@@ -25,7 +25,6 @@ from sweeps.progress import Advance, Start, unnoticed
 
 ASSETS = Path(__file__).parent / "site_assets"
 OUT = Path(__file__).parents[1] / "site"
-_OWNED = ("data/*.js", "data/traces/*.js", "figures/*.svg", "rows/*.json")
 GROUPS = {
     "ranked": "",
     "few": f"Not ranked: fewer than {views.LISTED_SEEDS} training seeds",
@@ -44,7 +43,7 @@ def build(results: Path = rows.RESULTS, out: Path = OUT, start: Start = unnotice
     for row in all_rows:
         stored = read_json(rows.path_of(str(row["row"]), results))
         texts[f"rows/{row['row']}.json"] = _json(stored) + "\n"
-    return write_all(out, texts, _OWNED)
+    return write_folder(out, texts)
 
 
 def page(all_rows: Sequence[Row], start: Start = unnoticed) -> dict[str, str]:

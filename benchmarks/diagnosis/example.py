@@ -14,7 +14,7 @@ from pam_envs.constants import BAR, MM
 from pam_envs.data import example
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.causes import by_name
-from sweeps.files import write_bytes
+from pam_envs.files import write_bytes
 from tests.diagnosis.hidden import EFFECTS
 
 WORLD, AMPLITUDE = "exponential_pressure_play_lag", 12.0

@@ -25,10 +25,11 @@ from benchmarks.diagnosis.markdown import bullets, share_text, table
 from benchmarks.diagnosis.sources import columns_of, draw_effect, draw_rig, sheet_of
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import provenance
-from benchmarks.runs.store import write_record, write_text
+from benchmarks.runs.store import write_record
 from pam_envs.data.recording.recording import Recording, read_input
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.diagnosis import diagnose
+from pam_envs.files import write_text
 from tests.diagnosis.hidden import EFFECTS
 
 NUMBER = 500

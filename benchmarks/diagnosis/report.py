@@ -17,8 +17,8 @@ from benchmarks.diagnosis.markdown import (
     share_text,
     table,
 )
-from benchmarks.runs.store import write_record, write_text
-from sweeps.files import write_bytes
+from benchmarks.runs.store import write_record
+from pam_envs.files import write_bytes, write_text
 from tests.diagnosis.hidden import EFFECTS
 
 LETTERS = dict(zip(VERDICTS, "NAOUIF", strict=True))

@@ -15,6 +15,7 @@ import hashlib
 import json
 import math
 import secrets
+import subprocess
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -28,13 +29,15 @@ from benchmarks.identity import artefacts, tasks, trainings
 from benchmarks.identity.hashing import digest
 from benchmarks.runs import provenance
 from benchmarks.runs.controllers import Entrant
-from benchmarks.runs.store import write_text
 from benchmarks.scenarios.scenario import ScenarioSet
+from pam_envs.files import write_text
 
 FILE = Path(__file__).resolve().parents[1] / "rounds.json"
 EPISODES = 30  # smallest number of audit episodes of a row
 PER_SCENARIO = 2
 """Smallest number of audit episodes per scenario: an interval needs the scatter within one."""
+KEPT = ("frozen", "salt", "drawn")
+"""Entries of a round, from which its seeds follow, that no commit may change."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,31 @@ def rounds() -> list[Round]:
 @lru_cache(maxsize=2)
 def _parsed(text: str) -> tuple[Round, ...]:
     return tuple(Round(**entry) for entry in json.loads(text)["rounds"])
+
+
+def altered() -> list[str]:
+    """Return the rounds of any earlier commit that the file lacks or states otherwise.
+
+    A clone without history, or a folder without git, has no earlier commit to compare with.
+    """
+    try:
+        name = f"./{FILE.name}"
+        commits = provenance.git("log", "--format=%H", "--", name, folder=FILE.parent).split()
+        texts = {c: provenance.git("show", f"{c}:{name}", folder=FILE.parent) for c in commits}
+    except (OSError, subprocess.SubprocessError):
+        return []
+    present = {(entry.track, entry.number): entry for entry in rounds()}
+    found = {}
+    for commit, text in texts.items():
+        numbers: Counter[str] = Counter()
+        for entry in json.loads(text)["rounds"]:
+            track = str(entry["track"])
+            numbers[track] += 1
+            now = present.get((track, numbers[track]))
+            if now is None or any(getattr(now, k) != entry.get(k, getattr(now, k)) for k in KEPT):
+                place = f"round {numbers[track]} of {track}"
+                found[place] = f"{place} is not that of commit {commit[:12]}; restore {FILE.name}"
+    return list(found.values())
 
 
 def last(track: str) -> Round | None:

@@ -17,6 +17,7 @@ from benchmarks.playground.scenes import SCENES, SWEEP, SWEEP_STEPS, Scene, acts
 from pam_envs.export.environment import environment_model
 from pam_envs.export.model import Model
 from pam_envs.export.wasm import INSTANCE, description, link
+from pam_envs.files import write_text
 from pam_envs.wording import package
 
 ASSETS = Path(__file__).parent / "assets"
@@ -104,7 +105,6 @@ def build() -> str:
 
 def write(folder: Path) -> Path:
     """Write the page into a folder, and return its path."""
-    folder.mkdir(parents=True, exist_ok=True)
     path = folder / "index.html"
-    path.write_text(build(), encoding="utf-8")
+    write_text(path, build())
     return path

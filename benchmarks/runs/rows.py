@@ -1,10 +1,12 @@
 """Rows of the board: one controller over one scenario file, with all data to reproduce it."""
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import fastjsonschema
 import numpy as np
 
 from benchmarks.identity import artefacts, tasks, trainings
@@ -15,16 +17,14 @@ from benchmarks.runs.controllers import Entrant
 from benchmarks.runs.store import read_record, write_record
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
+from pam_envs.wording import printable, shown
 
 SCHEMA = 4
 RESULTS = Path(__file__).parents[1] / "results"
-KEYS = (
-    *("row", "env", "task", "controller", "scenarios", "plants", "models", "seeds"),
-    *("training_seeds", "made_with", "episodes", "audit", "traces", "volatile"),
-    *("env.id", "env.version", "controller.name", "controller.kind", "controller.artefact"),
-    *("scenarios.name", "scenarios.version", "scenarios.digest", "scenarios.content"),
+_VALID = fastjsonschema.compile(
+    json.loads(Path(__file__).with_name("row.schema.json").read_text("utf-8"))
 )
-"""Entries of a row, and the sub-entries that other modules read."""
+MOST_CONTENT = 100_000  # characters of a scenario file in a row
 _NAME = re.compile(r"[A-Za-z0-9_]+")
 
 Row = dict[str, Any]
@@ -41,6 +41,12 @@ def path_of(name: str, folder: Path = RESULTS) -> Path:
     """Return the file of a row in a folder of rows: one folder a track, one file a controller."""
     track, _, controller = name.partition("--")
     return folder / track / f"{controller}{SUFFIX}"
+
+
+def is_name(text: str) -> bool:
+    """Return whether a text is of the form of a row's name."""
+    parts = text.split("--")
+    return len(parts) == 2 and all(map(_NAME.fullmatch, parts))
 
 
 def name_of(path: Path) -> str:
@@ -168,33 +174,53 @@ def load(path: Path) -> Row:
     return row
 
 
-def check_schema(row: Record, path: Path) -> None:
-    """Raise unless a record is a row of this schema, named as its file by plain names."""
+def check_schema(row: Any, path: Path) -> None:
+    """Raise ValueError unless a record has exactly the entries of a row, and the file's name."""
     again = f"run it again: {command(name_of(path))}"
-    if row.get("schema") != SCHEMA:
-        raise ValueError(
-            f"{path}: not a row of schema {SCHEMA}, but of {row.get('schema')!r}; {again}"
-        )
-    missing = []
-    for key in KEYS:
-        outer, _, inner = key.partition(".")
-        held = row if not inner else row.get(outer)
-        if not isinstance(held, Mapping) or (inner or outer) not in held:
-            missing.append(key)
-    if missing:
-        raise ValueError(f"{path}: a row without {', '.join(missing)}; {again}")
+    version = row.get("schema") if isinstance(row, Mapping) else None
+    if version != SCHEMA:
+        raise ValueError(f"{path}: not a row of schema {SCHEMA}, but of {shown(version)}; {again}")
+    try:
+        _VALID(row)
+        _check_content(row)
+    except fastjsonschema.JsonSchemaValueException as error:
+        place = str(error.name).removeprefix("data").lstrip(".") or "it"
+        why = printable(error.message.replace(error.name, place, 1)[:300])
+        raise ValueError(f"{path}: not a row: {why}; {again}") from error
+    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
+        raise ValueError(f"{path}: not a row: {printable(str(error)[:300])}; {again}") from error
     track, controller = str(row["scenarios"]["name"]), str(row["controller"]["name"])
-    names = {str(row["row"]), name_of(path), row_name(track, controller)}
-    plain = all(_NAME.fullmatch(name) for name in (track, controller))
-    if len(names) > 1 or not plain:
+    if {row["row"], name_of(path)} != {row_name(track, controller)}:
         raise ValueError(
             f"{path}: holds {row['row']!r}, of {controller!r} in {track!r}; file, row, track and "
-            f"controller have to agree, in letters, digits and _: {again}"
+            f"controller have to agree: {again}"
         )
     if track not in scenarios.names():
         raise ValueError(
             f"{path}: this checkout has no track {track!r}; check out the row's commit"
         )
+
+
+def _check_content(row: Record) -> None:
+    """Raise ValueError unless scenarios, scores and seeds of a row belong together."""
+    content, name = row["scenarios"]["content"], row["scenarios"]["name"]
+    if len(json.dumps(content)) > MOST_CONTENT:
+        raise ValueError(f"scenarios.content has more than {MOST_CONTENT:,} characters")
+    track = ScenarioSet(content)
+    given = (track.name, content["version"], track.env, track.digest)
+    said = (name, row["scenarios"]["version"], row["env"]["id"], row["scenarios"]["digest"])
+    if given != said:
+        raise ValueError("scenarios.content is not that of its name, version, digest and env")
+    names = {scenario.name for scenario in track.scenarios()}
+    for key in ("plants", "models", "seeds"):
+        if row[key].keys() != names:
+            raise ValueError(f"{key} has other names than the scenarios")
+    metrics, seeds = content["worst_case"].keys(), row["training_seeds"] or [None]
+    for k, episode in enumerate(row["episodes"]):
+        if episode["scenario"] not in names or episode["training_seed"] not in seeds:
+            raise ValueError(f"episodes[{k}] is of another scenario or training seed")
+        if episode["scores"].keys() != metrics:
+            raise ValueError(f"episodes[{k}].scores has other metrics than {name}")
 
 
 def command(name: str) -> str:

@@ -8,6 +8,7 @@ episodes as columns: one list of values per key, for episodes with the same keys
 import json
 import lzma
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,12 +16,15 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.identity.hashing import digest, plain
-from sweeps.files import write_bytes
+from pam_envs.files import fresh_folder, write_bytes, write_text
+from pam_envs.wording import printable, shown
 
 VOLATILE = "volatile"
 CHECKSUM = "checksum"
 COMPRESSED = ".xz"
 EPISODES, SCORES = "episodes", "scores"
+MOST = 50_000_000
+"""Largest number of bytes of a record."""
 
 
 def comparable(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -28,19 +32,13 @@ def comparable(record: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in record.items() if key not in (VOLATILE, CHECKSUM)}
 
 
-def write_text(path: Path, text: str) -> None:
-    """Replace a file by ``text``, atomically."""
-    write_bytes(path, text.encode())
-
-
-def write_all(folder: Path, texts: Mapping[str, str], owned: Sequence[str]) -> list[Path]:
-    """Write texts by relative path, remove other files of the ``owned`` patterns, return paths."""
-    written = {folder / name: text for name, text in texts.items()}
-    for path, text in written.items():
-        write_text(path, text)
-    for path in {path for pattern in owned for path in folder.glob(pattern)} - written.keys():
-        path.unlink()
-    return list(written)
+def write_folder(folder: Path, texts: Mapping[str, str]) -> list[Path]:
+    """Replace the folders and files of texts by relative path, all at once, and return paths."""
+    with fresh_folder(folder) as fresh:
+        for name, text in texts.items():
+            (fresh / name).parent.mkdir(parents=True, exist_ok=True)
+            (fresh / name).write_text(text, encoding="utf-8", newline="\n")
+    return [folder / name for name in texts]
 
 
 def seal(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -66,16 +64,49 @@ def write_json(path: Path, record: Mapping[str, Any]) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Return the content of a JSON file, compressed or not; its checksum is not verified."""
-    content = path.read_bytes()
+    """Return the content of a JSON file, compressed or not; its checksum is not verified.
+
+    A ValueError names the file: one of more than ``MOST`` bytes, unpacked, is not read, nor is one
+    with a key twice in an object, or a number that is not finite.
+    """
     try:
+        if path.stat().st_size > MOST:
+            raise ValueError(f"more than {MOST:,} bytes")
+        content = path.read_bytes()
         if path.suffix != COMPRESSED:
-            return json.loads(content)
-        held = json.loads(lzma.decompress(content))
+            return _parsed(content)
+        held = _parsed(_unpacked(content))
         packed = isinstance(held, dict) and EPISODES in held
         return {**held, EPISODES: from_columns(held[EPISODES])} if packed else held
-    except (ValueError, TypeError, LookupError, EOFError, lzma.LZMAError) as error:
-        raise ValueError(f"{path}: not JSON ({error})") from error
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        raise ValueError(f"{path}: not JSON ({printable(str(error)[:200])})") from error
+
+
+def _unpacked(content: bytes) -> bytes:
+    try:
+        unpacker = lzma.LZMADecompressor(lzma.FORMAT_XZ)
+        data = unpacker.decompress(content, MOST + 1)
+    except lzma.LZMAError as error:
+        raise ValueError(str(error)) from error
+    if not unpacker.eof:
+        raise ValueError(f"cut off, or more than {MOST:,} bytes")
+    return data
+
+
+def _parsed(content: bytes) -> Any:
+    """Return parsed JSON; ValueError for a key twice in an object, or for NaN and Infinity."""
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            key = next(k for k, count in Counter(k for k, _ in pairs).items() if count > 1)
+            raise ValueError(f"{shown(key)} is twice in an object")
+        return found
+
+    def refuse(name: str) -> Any:
+        raise ValueError(f"{name} is no number")
+
+    return json.loads(content, object_pairs_hook=unique, parse_constant=refuse)
 
 
 def columns(episodes: Any) -> Any:

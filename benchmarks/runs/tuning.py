@@ -36,12 +36,12 @@ from baselines.core.entry import Bounds, Knobs
 from baselines.core.tuned import Tuned, tuned_name
 from benchmarks.identity.hashing import digest
 from benchmarks.runs import cells, controllers
-from benchmarks.runs.store import write_text
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scenarios.scenario_env import make_env, model_of
 from benchmarks.scoring.metrics import COST_FLOOR, COST_RATIO, COSTS, headline_of
 from pam_envs.envs.registration import full_id
+from pam_envs.files import write_text
 from sweeps.files import SOURCES, sources_digest
 from sweeps.progress import Start
 

@@ -2,6 +2,7 @@
 
 import datetime
 import json
+import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,8 @@ from typing import Any
 from filelock import FileLock
 
 from benchmarks.runs import provenance, rows
-from benchmarks.runs.store import CHECKSUM, write_text
+from benchmarks.runs.store import CHECKSUM
+from pam_envs.files import write_text
 
 FILE = "verified.json"
 """Beside the rows: of each row ``checksum``, ``date``, ``mode``, ``commit`` and ``packages``."""
@@ -28,6 +30,21 @@ def read(folder: Path) -> Found:
         return {}
     except (ValueError, TypeError) as error:
         raise ValueError(f"{path}: {error}; restore it from git, or verify again") from error
+
+
+def committed(folder: Path) -> Found:
+    """Return the verifications that the last commit of this checkout holds for a folder of rows.
+
+    Those of another folder, or written since, were not made by its history.
+    """
+    if folder.resolve() != rows.RESULTS.resolve():
+        return {}
+    try:
+        text = provenance.git("show", f"HEAD:./{FILE}", folder=folder)
+    except (OSError, subprocess.SubprocessError):
+        return {}
+    kept, present = json.loads(text), read(folder)
+    return {name: entry for name, entry in present.items() if kept.get(name) == entry}
 
 
 def of(row: Mapping[str, Any], found: Found) -> Mapping[str, Any] | None:

@@ -1,7 +1,7 @@
 """Declared facts of a rig: ``RIG.yaml``.
 
     plant: single_muscle
-    muscle: {rest_length_mm: 200, diameter_mm: 10}
+    muscle: {rest_length_mm: 200, diameter_mm: 10, family: festo_dmsp}
     regulator: {max_pressure_bar: 6}
     load: hanging_mass            # or constant_force
     sensors: {contraction_noise_mm: 0.03, pressure_noise_bar: 0.008}
@@ -10,13 +10,17 @@
     repeats: [[holds_a, holds_b]] # segments that repeat one another
     valve_closed: [shut]          # segments during which the valve is shut
     tolerance: {mass.load: 0.02}  # relative tolerance of known parameters
+    parameters: {link.length: 0.3} # known parameters of the plant [SI]
+    channels: {pressure_bar: {from: AI/pressure, unit: kPa}}  # of a log file, by column
 
-Every key but ``plant`` may be missing.
+Every key but ``plant`` may be missing. The noise of other plants' sensors is declared under the
+name of the column (``angle_noise_deg`` of ``angle_deg``).
 """
 
 import dataclasses
 import hashlib
 import json
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,9 +28,13 @@ from typing import Any, Literal, NamedTuple, get_args
 
 from pam_envs import yaml_file
 from pam_envs.constants import BAR, MM
+from pam_envs.data.channel_sources import ChannelSource, sources_of
+from pam_envs.data.recording.channels import WIRINGS
 from pam_envs.wording import near, shown
 
 Load = Literal["hanging_mass", "constant_force"]
+MUSCLES = ("festo_mas", "festo_dmsp", "mckibben")
+"""Families of :mod:`pam_envs.plants.single_muscle.families`."""
 
 
 class Bounds(NamedTuple):
@@ -42,20 +50,30 @@ class Bounds(NamedTuple):
 NUMBERS = {
     "rest_length": Bounds("muscle.rest_length_mm", "mm", MM, 10.0, 5000.0),
     "diameter": Bounds("muscle.diameter_mm", "mm", MM, 1.0, 100.0),
-    "max_pressure": Bounds("regulator.max_pressure_bar", "bar", BAR, 0.5, 15.0),
+    "braid_angle": Bounds("muscle.braid_angle_deg", "deg", math.radians(1.0), 12.0, 50.0),
+    "max_pressure": Bounds("regulator.max_pressure_bar", "bar", BAR, 0.1, 30.0),
     "contraction_noise": Bounds("sensors.contraction_noise_mm", "mm", MM, 1e-5, 10.0),
     "pressure_noise": Bounds("sensors.pressure_noise_bar", "bar", BAR, 1e-6, 1.0),
     "clock_tolerance": Bounds("clock.tolerance_ms", "ms", 1e-3, 0.0, 1000.0),
 }
 """Fields of :class:`Rig` that are numbers with a unit."""
 SECTIONS: dict[str, tuple[str, ...]] = {
-    "muscle": ("rest_length_mm", "diameter_mm"),
+    "muscle": ("rest_length_mm", "diameter_mm", "family", "braid_angle_deg"),
     "regulator": ("max_pressure_bar",),
     "sensors": ("contraction_noise_mm", "pressure_noise_bar"),
     "history": ("cycles_since_rest", "rezeroed", "settled"),
     "clock": ("tolerance_ms",),
 }
-KEYS = ("plant", *SECTIONS, "load", "repeats", "valve_closed", "tolerance")
+KEYS = (
+    "plant",
+    *SECTIONS,
+    "load",
+    "repeats",
+    "valve_closed",
+    "tolerance",
+    "parameters",
+    "channels",
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,6 +86,11 @@ class Rig:
         Family of the plant to replay the recording through.
     rest_length, diameter : float or None
         Of the muscle [m].
+    family : str
+        Family of the muscle's base plant (:mod:`pam_envs.plants.single_muscle.families`); empty:
+        the one that is nearest to the recording.
+    braid_angle : float or None
+        Angle between threads and axis at rest [rad].
     max_pressure : float or None
         Largest gauge pressure that the regulator gives [Pa].
     load : {"hanging_mass", "constant_force"}
@@ -89,6 +112,12 @@ class Rig:
         Segments during which the valve is shut, so that the command has no effect.
     tolerance : mapping of str to float
         Plant parameters that are known, with the relative error within which they are.
+    noise : mapping of str to float
+        RMS of the noise of other plants' outputs, by channel [SI].
+    parameters : mapping of str to float
+        Known parameters of the plant, by dotted name [SI]; they start its fit.
+    channels : mapping of str to ChannelSource
+        Channels of the recording's file, by column; empty if the file has these columns itself.
     source : str
         Origin of the values.
     """
@@ -96,6 +125,8 @@ class Rig:
     plant: str = "single_muscle"
     rest_length: float | None = None
     diameter: float | None = None
+    family: str = ""
+    braid_angle: float | None = None
     max_pressure: float | None = None
     load: Load = "hanging_mass"
     contraction_noise: float | None = None
@@ -107,13 +138,22 @@ class Rig:
     repeats: tuple[tuple[str, ...], ...] = ()
     valve_closed: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    noise: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    parameters: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    channels: Mapping[str, ChannelSource] = dataclasses.field(default_factory=dict)
     source: str = dataclasses.field(default="arguments", compare=False)
 
     @property
     def digest(self) -> str:
-        """Sixteen hexadecimal digits that change with any value."""
-        values = {k: v for k, v in vars(self).items() if k != "source"}
+        """Sixteen hexadecimal digits that change with any value, except where columns are read."""
+        unused = {"source", "channels"} | {
+            k for k in ("family", "braid_angle") if not vars(self)[k]
+        }
+        values = {k: v for k, v in vars(self).items() if k not in unused}
         values["tolerance"] = dict(self.tolerance)
+        for name in ("noise", "parameters"):  # they leave the digests of other files alone
+            given = dict(values.pop(name))
+            values |= {name: given} if given else {}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
     def __post_init__(self) -> None:
@@ -146,6 +186,11 @@ class Rig:
             )
         for label, times in named.items():
             _require(times == 1, f"repeats names the segment {shown(label)} twice; name it once")
+        for name, value in self.noise.items():
+            _require(
+                value > 0.0,
+                f"the noise of {name} is {value:g}; give its RMS, above 0, or leave it out",
+            )
         for name, value in self.tolerance.items():
             _require(
                 name.count(".") == 1,
@@ -178,8 +223,11 @@ class Rig:
 def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments of :class:`Rig`, in SI."""
     _refuse_unknown(data, KEYS, "")
-    sections = {name: _section(data.get(name), name, keys) for name, keys in SECTIONS.items()}
     plant = data.get("plant")
+    wiring = WIRINGS.get(str(plant).strip())
+    noises = {c.noise_key: c for c in wiring.outputs} if wiring else {}
+    known = SECTIONS | ({"sensors": tuple(noises)} if wiring else {})
+    sections = {name: _section(data.get(name), name, keys) for name, keys in known.items()}
     _require(
         isinstance(plant, str) and bool(plant.strip()),
         f"plant is {shown(plant)}; name the plant's family, for example plant: single_muscle",
@@ -190,12 +238,21 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
         if sections[section].get(key) is not None:
             number = _number(sections[section][key], bounds.key, bounds.unit)
             given[field] = number * bounds.scale
+    given["noise"] = {
+        noises[key].name: _number(value, f"sensors.{key}", noises[key].unit) * noises[key].scale
+        for key, value in sections["sensors"].items()
+        if key in noises and value is not None
+    }
+    given["parameters"] = _parameters(data.get("parameters"))
+    if sections["muscle"].get("family") is not None:
+        given["family"] = _family(sections["muscle"]["family"])
     if data.get("load") is not None:
         given["load"] = data["load"]
     given |= _history(sections["history"])
     given["repeats"] = _repeats(data.get("repeats"))
     given["valve_closed"] = _labels(data.get("valve_closed"), "valve_closed")
     given["tolerance"] = _tolerance(data.get("tolerance"))
+    given["channels"] = sources_of(data.get("channels"))
     return given
 
 
@@ -226,6 +283,12 @@ def _number(value: Any, key: str, unit: str) -> float:
     return number
 
 
+def _family(value: Any) -> str:
+    good = value in MUSCLES
+    _require(good, f"muscle.family is {shown(value)}; choose one of {', '.join(MUSCLES)}")
+    return str(value)
+
+
 def _history(section: Mapping[str, Any]) -> dict[str, Any]:
     given = {key: value for key, value in section.items() if value is not None}
     for key, kind, what in (
@@ -253,6 +316,15 @@ def _repeats(value: Any) -> tuple[tuple[str, ...], ...]:
         f"{shown(value)}",
     )
     return tuple(_labels(group, "each group of repeats") for group in value or [])
+
+
+def _parameters(value: Any) -> dict[str, float]:
+    _require(
+        value is None or isinstance(value, Mapping),
+        "parameters must be a mapping from parameter to value in SI, for example "
+        f"{{link.length: 0.3}}, got {shown(value)}",
+    )
+    return {str(k): _number(v, f"parameters.{k}", "SI") for k, v in (value or {}).items()}
 
 
 def _tolerance(value: Any) -> dict[str, float]:

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import dataclasses
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 
 from pam_envs.arrays import Array
 from pam_envs.constants import ATMOSPHERE
 
-FILE = "antagonistic_stick_slip.csv.gz"
+FILE, RIG = "antagonistic_stick_slip.csv.gz", "antagonistic_stick_slip_rig.yaml"
+FOLDER = Path(__file__).parent
 KPA, MM = 1e3, 1e-3
 MUSCLE_LENGTH = 0.2
 """Length of the muscles [m], as the record's own script states."""
@@ -54,6 +56,11 @@ def log_slopes(displacement: Array, pressures: Array) -> Array:
     """Return slopes [1/m] of the log of absolute pressures, gauge [Pa] (m, n), by displacement."""
     x = displacement - displacement.mean()
     return np.asarray(np.log(pressures + ATMOSPHERE) @ x / (x @ x))
+
+
+def recording_and_rig(folder: Path = FOLDER) -> tuple[Path, Path]:
+    """Return the files of the record and of its rig, whose ``channels`` are those of a joint."""
+    return folder / FILE, folder / RIG
 
 
 def load_stick_slip() -> StickSlipRecord:

@@ -2,10 +2,12 @@
 
 from typing import Any
 
-__all__ = ["Diagnosis", "diagnose", "diagnose_readings"]
+__all__ = ["Diagnosis", "Quantity", "Simulator", "diagnose", "diagnose_readings"]
 
 _HOMES = {
     "Diagnosis": "pam_envs.diagnosis.report.outcome",
+    "Quantity": "pam_envs.diagnosis.families.simulator",
+    "Simulator": "pam_envs.diagnosis.families.simulator",
     "diagnose": "pam_envs.diagnosis.diagnosis",
     "diagnose_readings": "pam_envs.diagnosis.static.diagnosis",
 }

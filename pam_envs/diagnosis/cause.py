@@ -15,6 +15,7 @@ NEEDS = {
     "temperature": "varying `temperature_C`",
     "valve_closed": "a segment with the valve closed (`valve_closed` in RIG.yaml)",
     "rest": "a rested muscle at the start (`cycles_since_rest` in RIG.yaml)",
+    "command": "commanded pressures",
     "exhaust": "a command that falls by more than 0.5 bar",
 }
 """Requirements of a cause on a recording, in words."""

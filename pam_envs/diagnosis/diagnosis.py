@@ -3,19 +3,19 @@
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from pam_envs.arrays import Array, Flags
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.audit.audit import audit
 from pam_envs.diagnosis.audit.noise import ChannelFloor, Floor, noise_floor
-from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.causes import by_name, selected
+from pam_envs.diagnosis.cause import Cause, Form
+from pam_envs.diagnosis.causes import selected
 from pam_envs.diagnosis.closed_loop import gain as loops
 from pam_envs.diagnosis.decide import isolability as iso
 from pam_envs.diagnosis.decide.flexible_base import FlexibleBase, shapes_of
@@ -26,24 +26,18 @@ from pam_envs.diagnosis.decide.structure import Regressors
 from pam_envs.diagnosis.decide.verdict import Decision, decide, effect_traces
 from pam_envs.diagnosis.experiment.experiment import propose, rival_of
 from pam_envs.diagnosis.experiment.plans import Means
+from pam_envs.diagnosis.families.kinds import kind_of
 from pam_envs.diagnosis.fit import tolerance
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.calibrate import Calibration, calibrate
 from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
-from pam_envs.diagnosis.fit.single_muscle import (
-    USUAL_ROWS,
-    MuscleFamily,
-    identified,
-    inputs_of,
-    start_plant,
-)
+from pam_envs.diagnosis.plant_protocol import Bound, Fitted, Kind
 from pam_envs.diagnosis.report.outcome import Diagnosis, Traces, steps
 from pam_envs.diagnosis.report.report import plain
 from pam_envs.diagnosis.report.summary import report_of
 from pam_envs.diagnosis.report.summary_causes import judged
 from pam_envs.plants.core.plant import UnstableParameters
-from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.pneumatics.flow import REPLACED
 
 UNDECLARED, BELIEVED = 1.15, 1.5
 """Noise over the estimate from repeats or holds: without a declaration, and the largest declared
@@ -59,7 +53,7 @@ ADVICE = (
 
 def diagnose(
     recording: Recording,
-    plant: SingleMuscle | None = None,
+    plant: Any = None,
     *,
     rig: Rig | None = None,
     design: Callable[..., Any] | None = None,
@@ -77,9 +71,10 @@ def diagnose(
     ----------
     recording : Recording
         See :func:`pam_envs.data.recording.recording.load_recording`.
-    plant : SingleMuscle, optional
-        Plant to refit; effects that are not neutral in it are part of the base. Default: the
-        shipped muscle, scaled to the rig, without any effect.
+    plant : Plant or Simulator, optional
+        Plant to refit, of the rig's family; effects that are not neutral in it are part of the
+        base. Or a simulator of any plant (:class:`pam_envs.diagnosis.Simulator`). Default: the
+        shipped plant of the rig's family, scaled to the rig, without any effect.
     rig : Rig, optional
         Known properties of the rig; see :class:`pam_envs.data.rig_file.Rig`.
     design : callable, optional
@@ -94,7 +89,7 @@ def diagnose(
         Show a progress bar.
     simulated : object, optional
         The rig itself, if it can be run (:class:`pam_envs.diagnosis.closed_loop.gain.Rig`).
-    oracle : SingleMuscle or Simulated, optional
+    oracle : Plant or Simulated, optional
         True plant of the rig, if it is known.
     rule : Rule, optional
         Thresholds of the decision.
@@ -113,20 +108,23 @@ def diagnose(
     """
     started = clock.perf_counter()
     rule, sheet = rule or Rule(), rig or Rig()
-    asked = selected(causes)
-    with fit_failures_explained(), steps(progress) as step:
+    kind = kind_of(plant, sheet, declared=rig is not None)
+    wanted = selected(causes, kind.catalogue)
+    asked = kind.causes(wanted)
+    absent = [cause.name for cause in wanted if cause.name not in {c.name for c in asked}]
+    with threadpool_limits(1, "blas"), fit_failures_explained(), steps(progress) as step:
         step("checking the data")
-        checked = audit(recording, sheet)
+        checked = kind.audit(recording, sheet)
         if checked.problems:
             raise ValueError("the recording cannot be used: " + " ".join(checked.problems))
         floor = noise_floor(recording, sheet)
         step("refitting the plant")
-        start = plant if plant is not None else start_plant(sheet)
-        study = Study.begin(recording, sheet, start, floor)
+        start = plant if plant is not None else kind.start(sheet)
+        study = Study.begin(recording, sheet, start, floor, kind)
         study.rule, study.seed = rule, seed
         study.make_flexible(asked)
         step("isolability of causes")
-        study.find_testable(asked)
+        study.find_testable(asked, absent)
         step("fitting rival causes")
         study.decide()
         study.recheck_loads()
@@ -175,6 +173,23 @@ def fit_failures_explained() -> Iterator[None]:
         raise ValueError(ADVICE) from error
 
 
+ORIFICES_REPLACE = "flow through the orifices of the valve is modelled instead"
+
+
+def acting(causes: Sequence[Cause], plant: Any) -> tuple[list[Cause], list[str]]:
+    """Return causes with the forms that act on a plant, and the names of those without any."""
+    if getattr(plant, "air", "regulator") != "flow":
+        return list(causes), []
+    without = {f"regulator.{name}" for name in REPLACED}
+
+    def acts(form: Form) -> bool:
+        """Return whether no amount of a form is replaced."""
+        return not any(term.amount and term.name in without for term in form.terms)
+
+    made = [replace(c, forms=tuple(filter(acts, c.forms))) for c in causes]
+    return [c for c in made if c.forms], [c.name for c in made if not c.forms]
+
+
 EXCHANGE = (0.06, 0.6)
 """Seconds before and after a change of the load that are not compared: a recording does not show
 how the load was exchanged."""
@@ -207,13 +222,15 @@ class Study:
 
     recording: Recording
     sheet: Rig
-    start: SingleMuscle
+    kind: Kind
+    start: Any
     floor: Floor
-    fitted: Calibration
+    fitted: Fitted
     blocks: Blocks
     base: Candidate
     normal: Candidate  # the base with the common differences that the recording needs
     regressors: Regressors
+    driving: tuple[str, Array] | None = None  # label and values of the signal that drives loops
     rule: Rule = field(default_factory=Rule)
     seed: int = 0
     causes: list[Cause] = field(default_factory=list)
@@ -229,35 +246,37 @@ class Study:
     loop_reason: str | None = "it was not requested"
 
     @classmethod
-    def begin(cls, recording: Recording, sheet: Rig, plant: SingleMuscle, floor: Floor) -> "Study":
+    def begin(
+        cls, recording: Recording, sheet: Rig, plant: Any, floor: Floor, kind: Kind | None = None
+    ) -> "Study":
         """Fit the base parameters of a plant to a recording."""
-        known = sheet.clock_tolerance
-        clock = USUAL_ROWS * recording.period if known is None else known
-        family = MuscleFamily(plant, inputs_of(recording, sheet), clock)
+        kind = kind_of(plant, sheet) if kind is None else kind
+        family = kind.bind(plant, recording, sheet)
+        fallbacks = {output.name: output.noise for output in kind.outputs}
         measured = np.full((len(family.channels), len(recording.time)), np.nan)
         noise = np.empty(len(family.channels))
-        for k, (channel, fallback) in enumerate(
-            zip(family.channels, family.fallback_noise, strict=True)
-        ):
-            values = getattr(recording, channel)
-            noise[k] = fallback
+        for k, channel in enumerate(family.channels):
+            values = recording.reading(channel)
+            noise[k] = fallbacks[channel]
             if values is not None:
                 measured[k] = np.where(recording.filled, np.nan, values)
                 if channel == "contraction":
                     measured[k][exchanges(recording)] = np.nan
-                noise[k] = max(_noise(floor[channel]), 1e-3 * fallback)
+                noise[k] = max(_noise(floor[channel]), 1e-3 * fallbacks[channel])
         ticks = np.asarray(np.arange(len(recording.time)) * recording.period, np.float64)
         blocks = Blocks.make(ticks, measured)
-        shapes, rates = shapes_of(recording, sheet), by_name("slew_limit").forms
-        fitted = calibrate(family, measured, noise, blocks, ticks, shapes, rates)
+        shapes = shapes_of(recording, sheet)
+        fitted = kind.calibrate(family, measured, noise, blocks, ticks, shapes)
         problem, base = fitted.problem, fitted.base
         column = column_of(base.fit, base.fit.z)[None]
         problem.tie(column)
         outputs = fitted.family.simulate(column)[:, :, 0]
+        found = fitted.family.signals(recording, outputs)
         regressors = Regressors.make(
-            ticks, recording.command, outputs, recording.load, recording.temperature
+            ticks, found.command, found.outputs, found.load, found.temperature, found.drive
         )
-        return cls(recording, sheet, plant, floor, fitted, blocks, base, base, regressors)
+        data = (recording, sheet, kind, plant, floor, fitted, blocks, base, base, regressors)
+        return cls(*data, found.shown)
 
     def floor_of(self, channel: str) -> tuple[float, str]:
         """Return the error [m], [Pa] of a perfect model, and its source."""
@@ -270,15 +289,15 @@ class Study:
         """The base with the causes of the decision."""
         return self.normal if self.decision is None else self.decision.model
 
-    def plant_of(self, candidate: Candidate) -> SingleMuscle:
+    def plant_of(self, candidate: Candidate) -> Any:
         """Return the plant of a candidate."""
         return self.family.plant_of(self.column(candidate.fit))
 
-    def identified(self, candidate: Candidate) -> SingleMuscle:
+    def identified(self, candidate: Candidate) -> Any:
         """Return the plant of a candidate with the provenance of its fitted parameters."""
         digest = self.recording.digest[:12]
         source = f"pam-envs diagnose, recording {digest}, rule {self.rule.version}"
-        return identified(self.plant_of(candidate), candidate.fit.frees, source)
+        return self.family.identified(self.plant_of(candidate), candidate.fit.frees, source)
 
     def column(self, fit: Fit) -> Array:
         """Return the completed parameter column of a fit."""
@@ -291,7 +310,7 @@ class Study:
         return self.family.simulate(self.column(candidate.fit)[None])[:, :, 0]
 
     @property
-    def family(self) -> MuscleFamily:
+    def family(self) -> Bound:
         """The plant with the inputs of the recording."""
         return self.fitted.family
 
@@ -322,20 +341,21 @@ class Study:
         """Add the common differences that the recording needs to the base."""
         self.normal = self.flexible.select(causes)
 
-    def find_testable(self, causes: Sequence[Cause]) -> None:
-        """Keep the causes that the recording can show."""
-        self.isolability, self.not_testable = not_testable(
-            self.problem, self.family, self.normal.fit, causes, self.recording, self.sheet
-        )
+    def find_testable(self, causes: Sequence[Cause], absent: Sequence[str] = ()) -> None:
+        """Keep the causes that the recording can show; the plant has none of the ``absent``."""
+        causes, replaced = acting(causes, getattr(self.family, "plant", None))
+        data = (self.problem, self.family, self.normal.fit, causes, self.recording, self.sheet)
+        unmet = self.family.unmet_needs(self.recording, self.sheet)
+        self.isolability, self.not_testable = not_testable(*data, unmet)
+        self.not_testable |= dict.fromkeys(absent, "this plant has no parameter of it")
+        self.not_testable |= dict.fromkeys(replaced, ORIFICES_REPLACE)
         common = {cause.name for cause, _ in self.normal.causes}
         self.causes = [c for c in causes if c.name not in {*self.not_testable, *common}]
-        self.unseen = unseen_rivals(
-            self.problem, self.family, self.normal.fit, causes, self.recording, self.sheet
-        )
+        self.unseen = unseen_rivals(*data, unmet)
 
     def recheck_loads(self) -> None:
         """Repeat the decision with loads refitted within their tolerance if they may explain it."""
-        if self.decision is None:
+        if self.decision is None or not self.kind.weighed:
             return
         known, loads = self.sheet.tolerance.get(tolerance.LOAD), self.recording.load / GRAVITY
         limit = tolerance.load_error_limit(loads, tolerance.UNWEIGHED if known is None else known)
@@ -395,7 +415,7 @@ class Study:
 
     def experiment(self) -> None:
         """Propose the experiment that separates the open rivals."""
-        decision = self.decision
+        decision = self.decision if self.kind.experiments else None
         if decision is None or decision.verdict != "ambiguous" or not decision.open_rivals:
             return
         first, *others = (
@@ -410,7 +430,7 @@ class Study:
             np.where(measured, self.problem.noise, np.inf),
             Means.of(self.recording, self.sheet),
             self.causes,
-            self.family.inputs.longest_step,
+            self.fitted.family.inputs.longest_step,  # type: ignore[attr-defined]
         )
 
     def close_loop(self, design: Callable[..., Any] | None, simulated: Any, oracle: Any) -> None:
@@ -451,7 +471,7 @@ class Study:
         if not any(cause.compensable for cause in causes):
             names = ", ".join(cause.name for cause in causes)
             return f"a controller cannot compensate {names}"
-        return None
+        return self.kind.loop_reason or None
 
     def traces(self) -> Traces:
         """Return the time series of the report's figures."""
@@ -477,4 +497,6 @@ class Study:
             split(self.problem.shaped(self.outputs(self.base))),
             split(self.problem.shaped(self.outputs(self.model))),
             {name: split(trace) for name, trace in effects.items()},
+            {c: (r.channel(c).unit, r.channel(c).scale) for c in channels},
+            self.driving,
         )

@@ -73,13 +73,12 @@ def muscle_by_address(book: Any, mode: int) -> None:
         pressure, pressure, strain, 1.0, law[0, 0], law[1, 0], law[2, 0], law[3, 0], law[4, 0],
         law[5, 0], law[6, 0], law[7, 0], law[8, 0],
     )  # fmt: skip
-    more, _, _ = map_force(law, 0, 9, pressure, strain)
     limit = max(0.0, data[LIMIT] + data[GROWTH] * pressure)
     lag_strain, _ = slip_lag(strain, limit, thresholds, curves, data[LOW], data[PER], sliders)
     for k in range(len(thresholds)):
         sliders[k] = play(strain, thresholds[k] * limit, sliders[k])
     outputs[0] = pressure
-    outputs[1] = force + more - data[FRICTION] * lag_strain
+    outputs[1] = force + map_force(law, 0, 9, pressure, strain) - data[FRICTION] * lag_strain
     numbers[BEGUN] = numbers[BEGUN] + 1
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import gymnasium as gym
 
 from pam_envs import yaml_file
+from pam_envs.files import fresh_folder
 from pam_envs.wording import near, shown
 
 if TYPE_CHECKING:
@@ -95,22 +96,23 @@ def registered(what: str) -> str:
 
 
 def export(model: Model, target: Format, folder: Path, platforms: tuple[str, ...] = ()) -> Path:
-    """Write the artefact of a model into a folder.
+    """Write the artefact of a model into a folder, all of it or nothing.
 
     Raises
     ------
     OSError
-        If a linker is missing.
+        If a linker is missing, or the folder cannot be written.
     """
     if platforms and target != "fmu":
         raise ValueError(f"--platforms is for FMUs; --target {target} needs none")
-    if target == "fmu":
-        from pam_envs.export.fmu import export_fmu
+    with fresh_folder(folder) as fresh:
+        if target == "fmu":
+            from pam_envs.export.fmu import export_fmu
 
-        export_fmu(model, folder, platforms)
-    else:
-        writer = import_module(f"pam_envs.export.{target}")
-        getattr(writer, f"export_{target}")(model, folder)
+            export_fmu(model, fresh, platforms)
+        else:
+            writer = import_module(f"pam_envs.export.{target}")
+            getattr(writer, f"export_{target}")(model, fresh)
     return folder
 
 

@@ -42,12 +42,12 @@ class HangingMass(MountEffects, SupportEffects, GuideEffects):
         ("ring_share", "ring_frequency", "ring_damping"),
     )
 
-    load: float = published(2.55, "kg", 0.0, 50.0, "of positioning2021", spread=(0.0, 4.55))
+    load: float = published(2.55, "kg", 0.0, 100.0, "of positioning2021", spread=(0.0, 4.55))
     moving_mass: float = assumed(
-        0.25, "kg", 0.05, 5.0, "end fitting, rod and half of a 10 mm muscle", spread=(0.15, 0.5)
+        0.25, "kg", 1e-3, 100.0, "end fitting, rod and half of a 10 mm muscle", spread=(0.15, 0.5)
     )
     damping: float = assumed(
-        250.0, "N s/m", 10.0, 1e4, "damping ratio 0.3 to 0.4 at 4.55 kg", spread=(120.0, 450.0)
+        250.0, "N s/m", 0.1, 1e5, "damping ratio 0.3 to 0.4 at 4.55 kg", spread=(120.0, 450.0)
     )
     # effects, neutral unless a recording shows them
     carried: float = assumed(1.0, "1", 0.0, 1.0, "accelerated share of the load", neutral=1.0)

@@ -68,16 +68,16 @@ class EffectiveAreaMuscle(
         MAP._fields,
     )
 
-    rest_length: float = published(0.1, "m", 0.02, 2.0, "positioning2021, Table 1: MAS-10-N-100")
-    diameter: float = published(0.01, "m", 0.003, 0.1, "positioning2021, Table 1: MAS-10-N-100")
+    rest_length: float = published(0.1, "m", 0.01, 5.0, "positioning2021, Table 1: MAS-10-N-100")
+    diameter: float = published(0.01, "m", 0.001, 0.1, "positioning2021, Table 1: MAS-10-N-100")
     braid_angle: float = assumed(
         0.499, "rad", 0.2, 0.9, "for drawings: DMSP-10-250 (public model code)"
     )
-    area: float = identified(8.7e-4, "m2", 1e-5, 2e-2, _FIT)
-    area_taper: float = identified(0.0, "1", 0.0, 6.0, _FIT, neutral=0.0)
-    braid_force: float = identified(106.0, "N", 0.0, 5e3, _FIT)
+    area: float = identified(8.7e-4, "m2", 1e-7, 0.2, _FIT)
+    area_taper: float = identified(0.0, "1", 0.0, 12.0, _FIT, neutral=0.0)
+    braid_force: float = identified(106.0, "N", 0.0, 5e4, _FIT)
     braid_strain: float = identified(0.0167, "1", 0.005, 0.2, _FIT)
-    stiffness: float = identified(2250.0, "N", 0.0, 1e5, _FIT)
+    stiffness: float = identified(2250.0, "N", 0.0, 1e6, _FIT)
     hardening: float = identified(8600.0, "N", -1e7, 1e7, _FIT)
     # a static map that has to be finer; neutral in the plain law
     area_curve: float = effect("1", -60.0, 60.0, "the area shrinks with strain squared too")

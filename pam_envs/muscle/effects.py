@@ -76,13 +76,13 @@ STRANDS = len(BREAKS)
 class StrandEffects:
     """Friction of the braid's strands: four Maxwell-slip elements in parallel with the muscle."""
 
-    strand_1: float = effect("N", 0.0, 500.0, "friction of the first strands to break away")
-    strand_2: float = effect("N", 0.0, 500.0, "friction of the second strands to break away")
-    strand_3: float = effect("N", 0.0, 500.0, "friction of the third strands to break away")
-    strand_4: float = effect("N", 0.0, 500.0, "friction of the last strands to break away")
+    strand_1: float = effect("N", 0.0, 5e4, "friction of the first strands to break away")
+    strand_2: float = effect("N", 0.0, 5e4, "friction of the second strands to break away")
+    strand_3: float = effect("N", 0.0, 5e4, "friction of the third strands to break away")
+    strand_4: float = effect("N", 0.0, 5e4, "friction of the last strands to break away")
     strand_break: float = assumed(0.02, "1", 0.001, 0.3, "strain at which the last strand slips")
     strand_per_pressure: float = assumed(
-        0.0, "1/Pa", -2e-6, 1e-4, "slip force gained over that at no pressure", neutral=0.0
+        0.0, "1/Pa", -2e-3, 0.1, "slip force gained over that at no pressure", neutral=0.0
     )
 
 
@@ -142,9 +142,9 @@ class LengthYieldEffects:
     no energy whatever length and pressure do (:mod:`pam_envs.kernels.yielding`).
     """
 
-    yield_force: float = effect("N", 0.0, 500.0, "friction at full yield, at no pressure")
+    yield_force: float = effect("N", 0.0, 5e4, "friction at full yield, at no pressure")
     yield_per_pressure: float = assumed(
-        0.0, "N/Pa", -1e-3, 1e-3, "friction gained with effective pressure", neutral=0.0
+        0.0, "N/Pa", -0.1, 0.1, "friction gained with effective pressure", neutral=0.0
     )
     yield_break: float = assumed(0.01, "1", 0.001, 0.3, "strain over which it yields, likewise")
     yield_ratio: float = assumed(
@@ -197,7 +197,7 @@ MAP_TERMS = (
 )  # fmt: skip
 """Orders in pressure and in strain of the terms of a finer static map: those of total order five
 that the law of the muscle does not have."""
-_TERM = "N", -500.0, 500.0
+_TERM = "N", -5e4, 5e4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,7 +221,7 @@ class StaticMapEffects:
     map_40: float = effect(*_TERM, "T_4(pressure) T_0(strain)")
     map_41: float = effect(*_TERM, "T_4(pressure) T_1(strain)")
     map_50: float = effect(*_TERM, "T_5(pressure) T_0(strain)")
-    map_pressure: float = assumed(6e5, "Pa", 1e4, 3e6, "upper end of the map")
+    map_pressure: float = assumed(6e5, "Pa", 100.0, 3e6, "upper end of the map")
     map_strain: float = assumed(0.2, "1", 0.02, 0.6, "upper end of the map")
 
 
@@ -230,43 +230,70 @@ MAP = named_rows(*declarations(StaticMapEffects))
 
 
 @kernel
-def chebyshev(x: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the Chebyshev polynomials of order 0 to 5, and their derivatives.
+def map_coordinate(x: float, end: float) -> tuple[float, float]:
+    """Return a pressure or strain in the range -1 to 1 of the map, and its derivative by ``x``.
 
-    They are constant beyond -1 and 1.
+    Beyond the range it stays at its end.
     """
-    t = max(-1.0, min(1.0, x))
-    on = 1.0 if t == x else 0.0
-    t2, t4 = t * t, t * t * t * t
+    scale = 2.0 / end
+    t = x * scale - 1.0
+    inside = max(-1.0, min(1.0, t))
+    return inside, scale if inside == t else 0.0
+
+
+@kernel
+def strain_polynomials(
+    sizes: Any, j: int, first: int, s: float
+) -> tuple[float, float, float, float, float, float]:
+    """Return the factors [N] of ``T_0`` to ``T_5`` of the pressure, at a strain's coordinate."""
+    s2 = s * s
+    c2, c3 = 2.0 * s2 - 1.0, (4.0 * s2 - 3.0) * s
+    c4, c5 = 8.0 * (s2 * s2 - s2) + 1.0, (16.0 * s2 * s2 - 20.0 * s2 + 5.0) * s
     return (
-        (1.0, t, 2.0 * t2 - 1.0, (4.0 * t2 - 3.0) * t, 8.0 * (t4 - t2) + 1.0,
-         (16.0 * t4 - 20.0 * t2 + 5.0) * t),
-        (0.0, on, on * 4.0 * t, on * (12.0 * t2 - 3.0), on * (32.0 * t2 - 16.0) * t,
-         on * (80.0 * t4 - 60.0 * t2 + 5.0)),
+        sizes[first + MAP.map_05][j] * c5,
+        sizes[first + MAP.map_13][j] * c3 + sizes[first + MAP.map_14][j] * c4,
+        sizes[first + MAP.map_20][j] + sizes[first + MAP.map_21][j] * s
+        + sizes[first + MAP.map_22][j] * c2 + sizes[first + MAP.map_23][j] * c3,
+        sizes[first + MAP.map_30][j] + sizes[first + MAP.map_31][j] * s
+        + sizes[first + MAP.map_32][j] * c2,
+        sizes[first + MAP.map_40][j] + sizes[first + MAP.map_41][j] * s,
+        sizes[first + MAP.map_50][j],
     )  # fmt: skip
 
 
 @kernel
-def map_force(
-    sizes: Any, j: int, first: int, drive: float, strain: float
-) -> tuple[float, float, float]:
+def map_force(sizes: Any, j: int, first: int, drive: float, strain: float) -> float:
     """Return the force [N] of a finer static map at an effective pressure [Pa] and a strain.
 
-    Then minus its derivative by strain [N], and its derivative by pressure [m2]. ``sizes`` holds
-    the parameters of :class:`StaticMapEffects` in rows from ``first``, one lane a column.
+    ``sizes`` holds the parameters of :class:`StaticMapEffects` in rows from ``first``, one lane a
+    column.
     """
-    per_pressure = 2.0 / sizes[first + MAP.map_pressure][j]
-    per_strain = 2.0 / sizes[first + MAP.map_strain][j]
-    of_pressure, by_pressure = chebyshev(drive * per_pressure - 1.0)
-    of_strain, by_strain = chebyshev(strain * per_strain - 1.0)
-    force, slope, gain = 0.0, 0.0, 0.0
-    for k in range(len(MAP_TERMS)):
-        p, e = MAP_TERMS[k]
-        size = sizes[first + k][j]
-        force = force + size * of_pressure[p] * of_strain[e]
-        slope = slope - size * of_pressure[p] * by_strain[e]
-        gain = gain + size * by_pressure[p] * of_strain[e]
-    return force, slope * per_strain, gain * per_pressure
+    t, _ = map_coordinate(drive, sizes[first + MAP.map_pressure][j])
+    s, _ = map_coordinate(strain, sizes[first + MAP.map_strain][j])
+    f0, f1, f2, f3, f4, f5 = strain_polynomials(sizes, j, first, s)
+    t2 = t * t
+    force = f0 + f1 * t + f2 * (2.0 * t2 - 1.0) + f3 * (4.0 * t2 - 3.0) * t
+    return force + f4 * (8.0 * (t2 * t2 - t2) + 1.0) + f5 * (16.0 * t2 * t2 - 20.0 * t2 + 5.0) * t
+
+
+@kernel
+def map_slopes(sizes: Any, j: int, first: int, drive: float, strain: float) -> tuple[float, float]:
+    """Return minus the derivative of :func:`map_force` by strain [N], and that by pressure [m2]."""
+    t, per_pressure = map_coordinate(drive, sizes[first + MAP.map_pressure][j])
+    s, per_strain = map_coordinate(strain, sizes[first + MAP.map_strain][j])
+    _, f1, f2, f3, f4, f5 = strain_polynomials(sizes, j, first, s)
+    t2, s2 = t * t, s * s
+    d3, d4, d5 = 12.0 * s2 - 3.0, (32.0 * s2 - 16.0) * s, 80.0 * s2 * s2 - 60.0 * s2 + 5.0
+    g1 = sizes[first + MAP.map_13][j] * d3 + sizes[first + MAP.map_14][j] * d4
+    g2 = sizes[first + MAP.map_21][j] + sizes[first + MAP.map_22][j] * 4.0 * s
+    g2 = g2 + sizes[first + MAP.map_23][j] * d3
+    g3 = sizes[first + MAP.map_31][j] + sizes[first + MAP.map_32][j] * 4.0 * s
+    slope = sizes[first + MAP.map_05][j] * d5 + g1 * t + g2 * (2.0 * t2 - 1.0)
+    slope = slope + g3 * (4.0 * t2 - 3.0) * t
+    slope = slope + sizes[first + MAP.map_41][j] * (8.0 * (t2 * t2 - t2) + 1.0)
+    gain = f1 + 4.0 * f2 * t + f3 * (12.0 * t2 - 3.0) + f4 * (32.0 * t2 - 16.0) * t
+    gain = gain + f5 * (80.0 * t2 * t2 - 60.0 * t2 + 5.0)
+    return -slope * per_strain, gain * per_pressure
 
 
 @kernel

@@ -162,7 +162,7 @@ def usual_dead_time() -> float:
 def usual_slew_rate() -> float:
     """Return the slew rate of a regulator that was measured, for regulators of its class."""
     return assumed(
-        6.8e5, "Pa/s", 1e4, 1e9, "DMSP-10-250 record, raw step", neutral=1e9, spread=(4e5, 1.2e6)
+        6.8e5, "Pa/s", 1e2, 1e9, "DMSP-10-250 record, raw step", neutral=1e9, spread=(4e5, 1.2e6)
     )
 
 
@@ -176,9 +176,7 @@ class Regulator(RegulatorEffects):
     are assumed, within what two identified regulators of its class show.
     """
 
-    max_pressure: float = published(
-        6e5, "Pa", 1e4, 1.2e6, "positioning2021, section 3.2: 0 to 6 bar"
-    )
+    max_pressure: float = published(6e5, "Pa", 1e4, 3e6, "positioning2021, section 3.2: 0 to 6 bar")
     dead_time: float = usual_dead_time()
     time_constant: float = assumed(
         0.05, "s", 0.002, 2.0, "DMSP-10-250 record; 83 ms: SMC ITV", spread=(0.035, 0.12)

@@ -420,6 +420,7 @@ SHOWN = Rig(
     repeats=(("holds_a", "holds_b"),),
     valve_closed=("shut",),
     tolerance={"mass.load": 0.02},
+    parameters={"mass.moving_mass": 0.4},
 )
 """That of the page."""
 FULL = """
@@ -432,6 +433,7 @@ history: {cycles_since_rest: 3, rezeroed: true}
 repeats: [[holds_a, holds_b], [1, 2]]
 valve_closed: [shut]
 tolerance: {mass.load: 0.02}
+parameters: {mass.moving_mass: 0.4}
 """
 
 

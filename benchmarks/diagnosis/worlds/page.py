@@ -17,7 +17,8 @@ from benchmarks.diagnosis.markdown import (
 )
 from benchmarks.diagnosis.sources import HELD_OUT
 from benchmarks.diagnosis.worlds.counts import GROUPS, figures
-from benchmarks.runs.store import write_record, write_text
+from benchmarks.runs.store import write_record
+from pam_envs.files import write_text
 
 PREFACE = Path(__file__).with_suffix(".md")
 TITLES = {"held_out": "held-out worlds", "tuned": "worlds of development", "all": "all worlds"}

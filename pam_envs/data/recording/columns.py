@@ -7,7 +7,7 @@ import itertools
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,15 +87,23 @@ class Sheet:
     """Cells of a file by column, without surrounding spaces; blank rows are left out.
 
     ``where`` is the file, for messages, and ``rows`` are those of the cells; the header is row 1.
+    Columns of a file that is no text are arrays of numbers (NaN is an empty cell) or of words.
     """
 
     where: str
-    cells: Mapping[str, list[str]]
+    cells: Mapping[str, "list[str] | NDArray[Any]"]
     rows: NDArray[np.int64]
+
+    def words(self, column: str) -> list[str]:
+        """Return the cells of a column as text."""
+        cells = self.cells[column]
+        if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
+            return ["" if np.isnan(cell) else f"{cell:g}" for cell in cells]
+        return [str(cell).strip() for cell in cells]
 
     def text(self, column: str) -> list[str]:
         """Return a column of words; none may be missing."""
-        cells = self.cells[column]
+        cells = self.words(column)
         empty = [int(r) for r, cell in zip(self.rows, cells, strict=True) if not cell]
         if empty:
             refuse(self.where, f"column {column} is empty in {rows_text(empty)}; fill the cells")
@@ -107,6 +115,8 @@ class Sheet:
         Empty and wrong cells are NaN.
         """
         cells = self.cells[column]
+        if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
+            return self._array(column, cells)
         empty = np.array([not cell for cell in cells], dtype=bool)
         try:
             values = np.array([cell or "nan" for cell in cells], dtype=np.float64)
@@ -125,6 +135,17 @@ class Sheet:
         hint = "write decimals with a point" if "," in first else "correct the cells"
         problem = f"column {column} holds no number in {rows_text(self.rows[at])}"
         return values, empty, [f"{problem} (the first is {shown(first)}); {hint}"]
+
+    def _array(
+        self, column: str, values: NDArray[Any]
+    ) -> tuple[Array, NDArray[np.bool_], list[str]]:
+        """Return an array of numbers as :meth:`numbers` does."""
+        empty = np.isnan(values)
+        wrong = ~(np.abs(values) < LARGEST) & ~empty
+        if not wrong.any():
+            return values, empty, []
+        at = f"{rows_text(self.rows[wrong])} (the first is {values[wrong][0]:g})"
+        return values, empty, [f"column {column} holds no number in {at}; correct the values"]
 
 
 def read_header(path: str | Path) -> tuple[str, ...]:

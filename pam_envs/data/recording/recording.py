@@ -8,7 +8,7 @@
 
 import dataclasses
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +18,16 @@ from numpy.typing import ArrayLike
 from pam_envs.arrays import Array, Flags, Indices
 from pam_envs.constants import BAR, MM
 from pam_envs.data.recording import clock as clocks
+from pam_envs.data.recording.channels import MUSCLE, WIRINGS, Channel, Wiring, excitation
 from pam_envs.data.recording.columns import (
     LONGEST_LABEL,
     RecordingError,
     Sheet,
     read_header,
-    read_sheet,
     refuse,
     rows_text,
 )
+from pam_envs.data.recording.formats.mapped import is_log, sheet_of
 from pam_envs.data.rig_file import Rig
 from pam_envs.data.tables import READINGS, ContractionTable, load_readings
 from pam_envs.wording import near
@@ -115,6 +116,11 @@ class Recording:
         Repairs made while reading.
     raw : Recording or None
         Before the averaging of a recording faster than 100 Hz.
+    inputs, outputs : mapping of str to ndarray
+        Channels of other plants than a single muscle, by name and in SI. ``command`` is then the
+        accumulated travel of the inputs (:func:`pam_envs.data.recording.channels.excitation`).
+    channels : mapping of str to Channel
+        Columns and units of inputs and outputs.
     """
 
     time: Array
@@ -136,9 +142,14 @@ class Recording:
     row: Indices
     notes: tuple[str, ...] = ()
     raw: "Recording | None" = dataclasses.field(default=None, repr=False)
+    inputs: Mapping[str, Array] = dataclasses.field(default_factory=dict, repr=False)
+    outputs: Mapping[str, Array] = dataclasses.field(default_factory=dict, repr=False)
+    channels: Mapping[str, Channel] = dataclasses.field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
+        for values in (*self.inputs.values(), *self.outputs.values()):
+            values.setflags(write=False)
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray):
@@ -215,6 +226,91 @@ class Recording:
             refuse(source, *problems)
         return _recording(columns, labels, rows, [], tuple(valve_closed), source)
 
+    @classmethod
+    def of_channels(
+        cls,
+        time: ArrayLike,
+        inputs: Mapping[str, ArrayLike],
+        outputs: Mapping[str, ArrayLike],
+        *,
+        plant: str = "",
+        channels: Sequence[Channel] = (),
+        segment: Sequence[str] | None = None,
+        valve_closed: Sequence[str] = (),
+        source: str = "arrays",
+    ) -> "Recording":
+        """Make a recording of any plant from arrays in SI, checked as a file is.
+
+        Parameters
+        ----------
+        time : array_like, shape (n,)
+            [s].
+        inputs, outputs : mapping of str to array_like, shape () or (n,)
+            Recorded channels by name [SI].
+        plant : str
+            Family of the plant, which gives units and columns of the channels.
+        channels : sequence of Channel, optional
+            Units of the channels of a plant of your own; others are shown in SI.
+        segment, valve_closed, source
+            As of :meth:`from_arrays`.
+
+        Raises
+        ------
+        RecordingError
+            Naming channel, rows and remedy.
+        """
+        wiring = WIRINGS.get(plant) or Wiring((), tuple(channels))
+        given = {"time": time, **inputs, **outputs}
+        n = np.asarray(time).size
+        columns = {
+            name: np.array(np.broadcast_to(np.asarray(v, np.float64), (n,)))
+            if np.ndim(v) == 0
+            else np.array(v, np.float64)
+            for name, v in given.items()
+        }
+        labels = ["all"] * n if segment is None else [str(label) for label in segment]
+        rows = np.arange(2, n + 2)
+        problems = [
+            f"{name} has the shape {values.shape}, time has ({n},); give one value a sample"
+            for name, values in columns.items()
+            if values.shape != (n,)
+        ]
+        problems += [] if len(labels) == n else [f"{len(labels)} labels for {n} samples"]
+        problems = problems or [
+            f"{name} is not finite in {rows_text(rows[~np.isfinite(values)])}; correct the values"
+            for name, values in columns.items()
+            if not np.isfinite(values).all()
+        ]
+        twice = sorted(set(inputs) & set(outputs))
+        problems += [f"{name} is both an input and an output; give it once" for name in twice]
+        if not problems and not outputs:
+            problems = ["there is no output; give at least one"]
+        if plant in WIRINGS:
+            known = {c.name: "input" for c in wiring.inputs}
+            known |= {c.name: "output" for c in wiring.outputs}
+            for kind, names in (("input", inputs), ("output", outputs)):
+                problems += [
+                    f"{name!r} is no {kind} of a {plant}"
+                    + near(name, [k for k, v in known.items() if v == kind])
+                    for name in names
+                    if known.get(name) != kind
+                ]
+        if problems:
+            refuse(source, *problems)
+        return _of_plant(
+            columns, tuple(inputs), tuple(outputs), wiring, labels, rows, [], valve_closed, source
+        )
+
+    def reading(self, channel: str) -> Any:
+        """Return the readings of an output [SI], shape (n,), None if it was not recorded."""
+        if self.outputs:
+            return self.outputs.get(channel)
+        return getattr(self, channel, None)
+
+    def channel(self, name: str) -> Channel:
+        """Return column and unit of a channel."""
+        return self.channels.get(name) or MUSCLE.get(name) or Channel(name, name)
+
     def rows_of(self, label: str) -> Indices:
         """Return the samples of a segment at which something was recorded."""
         if label not in self.segments:
@@ -224,12 +320,13 @@ class Recording:
 
 
 def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
-    """Read a recording from a CSV file, put on even steps.
+    """Read a recording from a CSV file or a log file, put on even steps.
 
     Parameters
     ----------
     path : str or Path
-        Columns as in ``docs/recording.md``, in any order.
+        Columns as in ``docs/recording.md``, in any order; or a file whose channels the rig maps to
+        these columns (``docs/formats.md``).
     rig : Rig, optional
         Names the segments with the valve shut, which must exist.
 
@@ -238,7 +335,9 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
     RecordingError
         With all problems, naming column, rows and remedy.
     """
-    sheet = read_sheet(path, COLUMNS, REQUIRED, "a recording")
+    if rig is not None and rig.plant in WIRINGS:
+        return _load_of_plant(path, rig)
+    sheet = sheet_of(path, rig.channels if rig else {}, COLUMNS, REQUIRED, "a recording")
     if not {"pressure_bar", "contraction_mm"} & set(sheet.cells):
         text = "give at least one of the columns pressure_bar and contraction_mm"
         if "force_N" in sheet.cells:
@@ -259,7 +358,11 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
 
 def read_input(path: str | Path, rig: Rig | None = None) -> Recording | ContractionTable:
     """Read a recording or a table of settled readings, according to its columns."""
+    if is_log(path) or (rig is not None and rig.channels):
+        return load_recording(path, rig)
     header = set(read_header(path))
+    if rig is not None and rig.plant in WIRINGS:
+        return load_recording(path, rig)
     if header & set(READINGS) and not header & (set(COLUMNS) - set(READINGS)):
         return load_readings(path)
     return load_recording(path, rig)
@@ -293,6 +396,77 @@ def _columns(sheet: Sheet) -> tuple[dict[str, Array], list[str]]:
     return columns, notes
 
 
+def _load_of_plant(path: str | Path, rig: Rig) -> Recording:
+    """Read a recording of a plant with more than one muscle."""
+    wiring = WIRINGS[rig.plant]
+    fields = {c.column: c for c in (*wiring.inputs, *wiring.outputs)}
+    sheet = sheet_of(path, rig.channels, ("time_s", "segment", *fields), ("time_s",), "a recording")
+    n, problems, columns = len(sheet.rows), [], {}
+    for name in ("time_s", *fields):
+        if name not in sheet.cells:
+            continue
+        values, empty, wrong = sheet.numbers(name)
+        problems += wrong
+        if empty.any() and not wrong:
+            problems.append(
+                f"column {name} is empty in {rows_text(sheet.rows[empty])}; fill the cells or "
+                "leave the rows out"
+            )
+        found = fields.get(name)
+        columns[found.name if found else "time"] = values * (found.scale if found else 1.0)
+    commands = [c for c in wiring.inputs if c.name in wiring.measured]
+    lacking = [c for c in commands if c.name not in columns]
+    # without any command the measured pressures drive the plant
+    pressures = [fields[c] for c in fields if fields[c].name in wiring.measured.values()]
+    needed = lacking if len(lacking) < len(commands) else []
+    if lacking and not needed:
+        needed = [c for c in pressures if c.name not in columns]
+    problems += [
+        f"row 1: a recording of a {rig.plant} needs the column {c.column}"
+        + ("" if c in lacking else ", or commands: " + ", ".join(k.column for k in commands))
+        for c in needed
+    ]
+    inputs = tuple(c.name for c in wiring.inputs if c.name in columns)
+    outputs = tuple(c.name for c in wiring.outputs if c.name in columns)
+    free = set(outputs) - (set(wiring.measured.values()) if lacking else set())
+    if not problems and not free:
+        listed = ", ".join(c.column for c in wiring.outputs)
+        problems = [f"row 1: give at least one output that is not an input: {listed}"]
+    if problems:
+        refuse(sheet.where, *problems)
+    labels = sheet.text("segment") if "segment" in sheet.cells else ["all"] * n
+    recording = _of_plant(
+        columns, inputs, outputs, wiring, labels, sheet.rows, [], rig.valve_closed, str(path)
+    )
+    problems = check_rig(recording, rig)
+    if problems:
+        refuse(str(path), *problems)
+    return recording
+
+
+def _of_plant(
+    columns: dict[str, Array],
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    wiring: Wiring,
+    labels: Sequence[str],
+    rows: Indices,
+    notes: list[str],
+    valve_closed: Sequence[str],
+    source: str,
+) -> Recording:
+    """Return channels by name [SI] as a recording."""
+    driven = {n: columns[n] for n in inputs}
+    measured = {
+        o: columns[o] for i, o in wiring.measured.items() if i not in driven and o in columns
+    }
+    moved = excitation(driven, len(rows)) + excitation(measured, len(rows), noisy=True)
+    made = {**columns, "command": moved, "load": np.zeros(len(rows))}
+    return _recording(
+        made, labels, rows, notes, tuple(valve_closed), source, inputs, outputs, wiring.channels
+    )
+
+
 def _recording(
     columns: dict[str, Array],
     labels: Sequence[str],
@@ -300,6 +474,9 @@ def _recording(
     notes: list[str],
     valve_closed: tuple[str, ...],
     source: str,
+    inputs: tuple[str, ...] = (),
+    outputs: tuple[str, ...] = (),
+    channels: Mapping[str, Channel] | None = None,
 ) -> Recording:
     """Return columns of a file (by field, in SI) as a recording."""
     if len(rows) < LEAST_ROWS:
@@ -319,7 +496,8 @@ def _recording(
     notes = notes + _mended(grid, rows) + load_changes(columns["load"], segment, segments, rows)
     shut = np.isin(segment, [index[label] for label in valve_closed if label in index])
     measured: dict[str, Any] = {
-        name: grid.linear(columns[name]) if name in columns else None for name in MEASURED
+        name: grid.linear(columns[name]) if name in columns and not outputs else None
+        for name in MEASURED
     }
     even = Recording(
         time=grid.time,
@@ -336,6 +514,9 @@ def _recording(
         filled=grid.filled,
         row=rows[grid.left],
         notes=tuple(notes),
+        inputs={name: columns[name][grid.held] for name in inputs},
+        outputs={name: grid.linear(columns[name]) for name in outputs},
+        channels=channels or {},
     )
     thinned = _thinned(even, clocks.block_size(clock.period))
     return dataclasses.replace(thinned, digest=_digest(thinned))
@@ -372,6 +553,11 @@ def _thinned(recording: Recording, size: int) -> Recording:
         command=recording.command[middle],
         **means,
         **kept,
+        inputs={name: values[middle] for name, values in recording.inputs.items()},
+        outputs={
+            name: clocks.block_means(values, starts, size)
+            for name, values in recording.outputs.items()
+        },
         period=size * recording.period,
         notes=(*recording.notes, note),
         raw=recording,
@@ -385,6 +571,8 @@ def _digest(recording: Recording) -> str:
         value = getattr(recording, field.name)
         if isinstance(value, np.ndarray) and field.name != "row":
             made.update(field.name.encode() + np.ascontiguousarray(value).tobytes())
+    for name, values in (*recording.inputs.items(), *recording.outputs.items()):
+        made.update(name.encode() + np.ascontiguousarray(values).tobytes())
     return made.hexdigest()[:16]
 
 

@@ -1,16 +1,17 @@
 """Audit of a recording or a table before its diagnosis: problems, warnings, undecidable causes."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from pam_envs.constants import BAR
+from pam_envs.data.recording.channels import MUSCLE
 from pam_envs.data.recording.recording import Recording, check_rig, repeat_rows
 from pam_envs.data.rig_file import Rig
 from pam_envs.data.tables import ContractionTable
 from pam_envs.diagnosis.audit import channels
-from pam_envs.diagnosis.audit.noise import holds, noise_floor
+from pam_envs.diagnosis.audit.noise import holds, noise_floor, outputs_of
 from pam_envs.diagnosis.audit.tables import audit_table
 from pam_envs.diagnosis.audit.units import wrong_units
 from pam_envs.diagnosis.cause import Cause
@@ -24,6 +25,10 @@ REST_SECONDS = 2.0
 WARMING = 1.0  # least variation of the temperature [K] that shows its effect
 SHUT_SECONDS = 2.0
 MANY_CYCLES = 5
+NO_REPEATS = (
+    "no segments repeat one another: the noise floor is estimated from holds; record one segment "
+    "twice and name both under repeats in RIG.yaml"
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,37 +47,66 @@ def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Au
     problems = [*check_rig(recording, rig), *unknown_names(rig.tolerance)]
     if problems:
         return Audit(tuple(problems), recording.notes)
-    floor = noise_floor(recording, rig)
     wrong, warnings = wrong_units(recording, rig)
+    problems, found = _channels(recording, rig, [*wrong])
+    warnings += [*found, *_lacks(recording, rig), *_not_used(recording, rig)]
+    return Audit(tuple(problems), tuple(dict.fromkeys((*recording.notes, *warnings))))
+
+
+def audit_channels(recording: Recording, rig: Rig, names: Sequence[str]) -> Audit:
+    """Return the findings on the channels of any plant with parameters of some names."""
+    problems = [*check_rig(recording, rig), *unknown_names(rig.tolerance, names)]
+    problems += unknown_names(rig.parameters, names, "parameters")
+    problems += [
+        f"RIG.yaml: noise is declared of {name!r}, which was not recorded"
+        for name in rig.noise
+        if name not in recording.outputs
+    ]
+    if problems:
+        return Audit(tuple(problems), recording.notes)
+    problems, warnings = _channels(recording, rig, [])
+    if not rig.repeats:
+        warnings.append(NO_REPEATS)
+    return Audit(tuple(problems), tuple(dict.fromkeys((*recording.notes, *warnings))))
+
+
+def _channels(recording: Recording, rig: Rig, wrong: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return problems, with those of wrong units, and warnings on the measured channels."""
+    floor, warnings = noise_floor(recording, rig), []
     problems = [
-        f"{channels.UNITS[name][0]} holds one value in all rows; connect the sensor, or leave the "
-        "column out"
-        for name in _outputs(recording)
-        if np.ptp(getattr(recording, name)) == 0.0
+        f"{recording.channel(name).column} holds one value in all rows; connect the sensor, or "
+        "leave the column out"
+        for name in outputs_of(recording)
+        if np.ptp(recording.reading(name)) == 0.0
     ]
     problems += wrong
     seen = recording if recording.raw is None else recording.raw
-    for name in channels.UNITS:
-        if getattr(seen, name) is not None:
-            stuck, still = channels.stuck(seen, name) if name in _outputs(seen) else ([], [])
+    for name in recording.outputs or MUSCLE:
+        if seen.reading(name) is not None:
+            stuck, still = channels.stuck(seen, name) if name in outputs_of(seen) else ([], [])
             problems += stuck
             warnings += still + channels.clipped(seen, name) + channels.spikes(seen, name)
     # the noise to compare a resolution with, without the part due to rounding
-    found = {name: floor[name] for name in _outputs(seen)}
+    found = {name: floor[name] for name in outputs_of(seen)}
     noise = {k: f.reading if f.declared is None else f.declared for k, f in found.items()}
     for name, rms in noise.items():
         warnings += channels.coarse(seen, name, rms)
     warnings += channels.copies(seen, noise)
-    warnings += [*floor.warnings, *_repeats(recording, rig), *_lacks(recording, rig)]
-    warnings += _not_used(recording, rig)
-    return Audit(tuple(problems), tuple(dict.fromkeys((*recording.notes, *warnings))))
+    return problems, [*warnings, *floor.warnings, *_repeats(recording, rig)]
 
 
 def undecidable(
-    recording: Recording, rig: Rig | None = None, causes: Sequence[Cause] | None = None
+    recording: Recording,
+    rig: Rig | None = None,
+    causes: Sequence[Cause] | None = None,
+    unmet: Mapping[str, str] | None = None,
 ) -> dict[str, str]:
-    """Return the causes, of the catalogue by default, that a recording cannot decide, and why."""
-    unmet, reasons = _unmet_needs(recording, rig or Rig()), {}
+    """Return the causes, of the catalogue by default, that a recording cannot decide, and why.
+
+    ``unmet`` are the needs that the recording does not meet; default: of a single muscle.
+    """
+    unmet = unmet_needs(recording, rig or Rig()) if unmet is None else unmet
+    reasons = {}
     for cause in catalogue() if causes is None else causes:
         lacks = [unmet[word] for word in cause.needs if word in unmet]
         if lacks:
@@ -80,7 +114,7 @@ def undecidable(
     return dict(sorted(reasons.items()))
 
 
-def _unmet_needs(recording: Recording, rig: Rig) -> dict[str, str]:
+def unmet_needs(recording: Recording, rig: Rig) -> dict[str, str]:
     """Return the needs of causes (:data:`NEEDS`) that a recording does not meet, and why."""
     levels, kelvin = load_levels(recording), recording.temperature
     span = 0.0 if kelvin is None else float(np.ptp(kelvin))
@@ -102,7 +136,7 @@ def _unmet_needs(recording: Recording, rig: Rig) -> dict[str, str]:
             else f"the temperature varied by only {span:.2g} K",
         ),
         "valve_closed": (
-            _longest_shut(recording) > SHUT_SECONDS,
+            longest_shut(recording) > SHUT_SECONDS,
             f"the valve was never shut for more than {SHUT_SECONDS:g} s (valve_closed in RIG.yaml)",
         ),
         "rest": (
@@ -121,11 +155,6 @@ def load_levels(recording: Recording) -> list[float]:
         if not levels or load - levels[-1] > LOAD_STEP:
             levels.append(float(load))
     return levels
-
-
-def _outputs(recording: Recording) -> list[str]:
-    pair = ("contraction", "pressure")
-    return [name for name in pair if getattr(recording, name) is not None]
 
 
 def _repeats(recording: Recording, rig: Rig) -> list[str]:
@@ -153,10 +182,7 @@ def _lacks(recording: Recording, rig: Rig) -> list[str]:
             "decided; record segments with at least two loads"
         )
     if not rig.repeats:
-        warnings.append(
-            "no segments repeat one another: the noise floor is estimated from holds; record one "
-            "segment twice and name both under repeats in RIG.yaml"
-        )
+        warnings.append(NO_REPEATS)
     for field, column, loss in (
         ("temperature", "temperature_C", "an effect of temperature looks like drift"),
         ("pressure", "pressure_bar", "effects of valve and muscle cannot be separated"),
@@ -196,7 +222,8 @@ def _not_used(recording: Recording, rig: Rig) -> list[str]:
     return warnings
 
 
-def _longest_shut(recording: Recording) -> float:
+def longest_shut(recording: Recording) -> float:
+    """Return the longest time [s] with the valve shut."""
     shut = recording.valve_closed & ~recording.filled
     same = shut[1:] & shut[:-1] & ~recording.restart[1:]
     return max((b - a + 1 for a, b in channels.runs(same)), default=0) * recording.period

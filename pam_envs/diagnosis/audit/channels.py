@@ -8,17 +8,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from pam_envs.arrays import Array, Flags
+from pam_envs.data.recording.channels import Channel
 from pam_envs.data.recording.columns import rows_text, span_text
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.audit.noise import half_width, resolution
 
-UNITS = {
-    "contraction": ("contraction_mm", "mm", 1e-3),
-    "pressure": ("pressure_bar", "bar", 1e5),
-    "supply": ("supply_pressure_bar", "bar", 1e5),
-    "force": ("force_N", "N", 1.0),
-}
-"""Column, unit and the unit in SI, by field of a recording."""
 STILL_SECONDS = 2.0
 ANSWER_SECONDS = 1.0  # time in which a reading may lag behind the command [s]
 STILL_COMMAND = 0.5e5  # change of the command [Pa] above which a constant reading may be stuck
@@ -29,6 +23,12 @@ SPIKE = 10.0
 COPIED_ROWS = 50
 COPIED_CHANGES = 0.5  # least share of samples of a copied stretch that differ from the previous one
 COARSE = 2.0  # ratio of resolution to RMS noise above which rounding hides the noise
+
+
+def _display(recording: Recording, channel: str) -> tuple[str, str, float]:
+    """Return column and unit of a channel, and the unit in SI."""
+    found: Channel = recording.channel(channel)
+    return found.column, found.unit, found.scale
 
 
 def runs(same: Flags) -> Iterator[tuple[int, int]]:
@@ -44,8 +44,8 @@ def stuck(recording: Recording, channel: str) -> tuple[list[str], list[str]]:
     A muscle may be at rest below its threshold and at reversals of the pressure; for a sensor at
     the end of its range see :func:`clipped`.
     """
-    column, unit, scale = UNITS[channel]
-    values = getattr(recording, channel)
+    column, unit, scale = _display(recording, channel)
+    values = recording.reading(channel)
     free = ~recording.valve_closed & ~recording.filled
     same = (np.diff(values) == 0.0) & free[1:] & free[:-1] & ~recording.restart[1:]
     wait = round(ANSWER_SECONDS / recording.period)
@@ -61,7 +61,7 @@ def stuck(recording: Recording, channel: str) -> tuple[list[str], list[str]]:
             f"{span_text(recording.row[first], recording.row[last])} while the command moves by "
             f"{moved / 1e5:.2g} bar"
         )
-        turning = channel == "contraction" and moved <= TURNING
+        turning = not channel.startswith("pressure") and moved <= TURNING
         if turning or _at_its_end(values, recording.command, first, last + 1 - wait):
             warnings.append(f"{text}: friction, a threshold or the end of its range holds it")
         else:
@@ -79,8 +79,8 @@ def _at_its_end(values: Array, command: Array, first: int, end: int) -> bool:
 
 def clipped(recording: Recording, channel: str) -> list[str]:
     """Return warnings on readings cut off at the top or bottom of a sensor's range."""
-    column, unit, scale = UNITS[channel]
-    values = getattr(recording, channel)
+    column, unit, scale = _display(recording, channel)
+    values = recording.reading(channel)
     if np.ptp(values) == 0.0:
         return []
     same = (np.diff(values) == 0.0) & ~recording.restart[1:] & ~recording.filled[1:]
@@ -104,8 +104,8 @@ def clipped(recording: Recording, channel: str) -> list[str]:
 
 def coarse(recording: Recording, channel: str, noise: float) -> list[str]:
     """Return a warning if the resolution of the readings hides the noise (RMS, SI)."""
-    column, unit, scale = UNITS[channel]
-    step = resolution(getattr(recording, channel))
+    column, unit, scale = _display(recording, channel)
+    step = resolution(recording.reading(channel))
     if step <= COARSE * noise or step == 0.0:
         return []
     return [
@@ -116,8 +116,8 @@ def coarse(recording: Recording, channel: str, noise: float) -> list[str]:
 
 def spikes(recording: Recording, channel: str) -> list[str]:
     """Return a warning on single readings far from neighbours that agree with one another."""
-    column, _, _ = UNITS[channel]
-    values = getattr(recording, channel)
+    column, _, _ = _display(recording, channel)
+    values = recording.reading(channel)
     if len(values) < 7:
         return []
     here = values[2:-2]
@@ -143,7 +143,7 @@ def copies(recording: Recording, noise: Mapping[str, float]) -> list[str]:
     """Return a warning if a stretch of readings occurs twice: a copy, not a measurement."""
     fine = [
         values
-        for values, rms in ((getattr(recording, name), rms) for name, rms in noise.items())
+        for values, rms in ((recording.reading(name), rms) for name, rms in noise.items())
         if resolution(values) <= COARSE * rms
     ]
     if not fine:

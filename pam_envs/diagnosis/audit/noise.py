@@ -14,13 +14,13 @@ from scipy.linalg import toeplitz
 from scipy.optimize import nnls
 
 from pam_envs.arrays import Array, Indices
-from pam_envs.constants import BAR, MM
+from pam_envs.data.recording.channels import Channel
 from pam_envs.data.recording.recording import Recording, repeat_rows
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.repeats import DISAGREE, Source, Trust, best, detrended
 
-CHANNELS = {"contraction": ("mm", MM), "pressure": ("bar", BAR)}
-"""Measured outputs with unit and scale of display."""
+PAIR = ("contraction", "pressure")
+"""Measured outputs of a single muscle."""
 SETTLING = 1.5  # time after a change of the command that is not used [s]
 SHORTEST, LONGEST = 1.0, 10.0  # used end of a hold [s]
 WINDOWS = (1.0, 1.5, 2.5, 5.0, 10.0)  # lengths of the windows at the ends of holds [s]
@@ -64,17 +64,23 @@ def noise_floor(recording: Recording, rig: Rig | None = None) -> Floor:
     """Estimate the noise of the measured outputs, in SI, from repeats, holds or innovations."""
     rig = rig or Rig()
     declared = {"contraction": rig.contraction_noise, "pressure": rig.pressure_noise}
+    known = rig.noise if recording.outputs else declared
     return Floor(
         {
-            channel: _channel(recording, rig, channel, declared[channel])
-            for channel in CHANNELS
-            if getattr(recording, channel) is not None
+            channel: _channel(recording, rig, channel, known.get(channel))
+            for channel in outputs_of(recording)
         }
     )
 
 
+def outputs_of(recording: Recording) -> list[str]:
+    """Return the names of the recorded outputs."""
+    return list(recording.outputs) or [n for n in PAIR if getattr(recording, n) is not None]
+
+
 def _channel(recording: Recording, rig: Rig, channel: str, declared: float | None) -> ChannelFloor:
-    values = getattr(recording, channel)
+    values = recording.reading(channel)
+    shown = recording.channel(channel)
     differences = _differences(recording, rig, values)
     ends = [values[rows] for rows in hold_ends(recording)]
     found = {
@@ -90,13 +96,16 @@ def _channel(recording: Recording, rig: Rig, channel: str, declared: float | Non
     rounding = float(resolution(values) / np.sqrt(12.0))  # not visible in a hold
     value = max(estimates.get(source, declared or 0.0), rounding)
     reading = estimates.get(source, 0.0)
-    if recording.raw is not None:  # averaging only reduces the white part
-        more = white_noise(recording.raw, getattr(recording.raw, channel)) ** 2
+    raw_values = None if recording.raw is None else recording.raw.reading(channel)
+    if (
+        recording.raw is not None and raw_values is not None
+    ):  # averaging only reduces the white part
+        more = white_noise(recording.raw, raw_values) ** 2
         less = white_noise(recording, values) ** 2
         reading = float(np.sqrt(reading**2 + max(0.0, more - less)))
     warnings = (
-        *_weak(channel, estimates, source, declared),
-        *_misdeclared(channel, reading, source, declared, rounding),
+        *_weak(shown, estimates, source, declared),
+        *_misdeclared(shown, reading, source, declared, rounding),
     )
     return ChannelFloor(value, reading, source, estimates, declared, warnings)
 
@@ -115,36 +124,36 @@ def resolution(values: Array) -> float:
 
 
 def _weak(
-    channel: str, estimates: Mapping[str, float], source: Source, declared: float | None
+    channel: Channel, estimates: Mapping[str, float], source: Source, declared: float | None
 ) -> list[str]:
     """Return warnings on a noise floor from a weaker source than intended."""
-    unit, scale = CHANNELS[channel]
+    unit, scale = channel.unit, channel.scale
     if source != "repeats" and "repeats" in estimates:
         value = declared if source == "declared" else estimates[source]
         assert value is not None
         what = "declared is" if source == "declared" else f"the {source} scatter by"
         return [
-            f"{channel}: the repeats differ by more than noise, by "
+            f"{channel.name}: the repeats differ by more than noise, by "
             f"{estimates['repeats'] / scale:.3g} {unit}, while {what} {value / scale:.3g} {unit}; "
             "the muscle or the rig changed between the repeats, so they are not used"
         ]
     if not estimates:
         more = "the declared noise is used" if declared is not None else "declare the sensor's"
-        return [f"{channel}: no noise can be seen in the recording; {more}"]
+        return [f"{channel.name}: no noise can be seen in the recording; {more}"]
     return []
 
 
 def _misdeclared(
-    channel: str, reading: float, source: Source, declared: float | None, rounding: float
+    channel: Channel, reading: float, source: Source, declared: float | None, rounding: float
 ) -> list[str]:
     if declared is None or reading == 0.0:
         return []
-    unit, scale = CHANNELS[channel]
+    unit, scale = channel.unit, channel.scale
     ratio = reading / float(np.hypot(declared, rounding))
     if 1.0 / DISAGREE <= ratio <= DISAGREE:
         return []
     return [
-        f"{channel}: the declared noise is {declared / scale:.3g} {unit}, the {source} say "
+        f"{channel.name}: the declared noise is {declared / scale:.3g} {unit}, the {source} say "
         f"{reading / scale:.3g} {unit} ({ratio:.2g} times); check the sensor or RIG.yaml"
     ]
 

@@ -16,7 +16,8 @@ PRESSURES = {
     "mbar": (1e3, "divide by 1000"),
 }
 """Other units of pressure: number of units in a bar, and the correction."""
-HIGHEST = 15.0
+HIGHEST, DECLARED = 15.0, 1.25
+"""Highest gauge pressure of muscles [bar], and over the pressure that RIG.yaml declares."""
 USUAL = 6.0  # usual gauge pressure of muscles [bar]
 LARGEST_SHARE = 0.4  # largest contraction of a muscle over its rest length
 SMALLEST_STROKE, SMALLEST_SHARE = 0.5e-3, 0.002
@@ -29,7 +30,7 @@ FOLLOWS = 0.5  # correlation with the command above which a contraction follows 
 def wrong_units(recording: Recording, rig: Rig) -> tuple[list[str], list[str]]:
     """Return problems and warnings on columns with wrong units."""
     problems = _command(recording, rig)
-    problems += [] if problems else _pressure(recording)
+    problems += [] if problems else _pressure(recording, rig)
     problems += _contraction(recording, rig)
     wrong, warnings = _load(recording)
     return problems + wrong, warnings + _suspicions(recording, rig)
@@ -45,16 +46,25 @@ def _advice(value: float, expected: float) -> str:
         unit = min(distance, key=lambda name: distance[name])
         if distance[unit] < math.log(2.5):
             return f"it looks like {unit}: {PRESSURES[unit][1]}"
+    if value > HIGHEST:
+        return (
+            f"check its unit, or declare regulator.max_pressure_bar above {HIGHEST:g} in RIG.yaml"
+        )
     return "no muscle runs at this pressure; check its unit"
 
 
+def _limit(rig: Rig) -> float:
+    """Return the pressure [bar] above which readings have another unit."""
+    return max(HIGHEST, DECLARED * (rig.max_pressure or 0.0) / BAR)
+
+
 def _command(recording: Recording, rig: Rig) -> list[str]:
-    highest = float(np.max(recording.command)) / BAR
+    highest, limit = float(np.max(recording.command)) / BAR, _limit(rig)
     expected = USUAL if rig.max_pressure is None else rig.max_pressure / BAR
-    if highest > HIGHEST:
+    if highest > limit:
         return [f"pressure_command_bar goes up to {highest:.4g}; {_advice(highest, expected)}"]
     pressure = 0.0 if recording.pressure is None else float(np.max(recording.pressure)) / BAR
-    if highest < 0.25 * pressure and 0.5 < pressure <= HIGHEST:
+    if highest < 0.25 * pressure and 0.5 < pressure <= limit:
         return [
             f"pressure_command_bar never exceeds {highest:.3g} while the pressure goes to "
             f"{pressure:.3g} bar; {_advice(highest, pressure)}"
@@ -62,7 +72,7 @@ def _command(recording: Recording, rig: Rig) -> list[str]:
     return []
 
 
-def _pressure(recording: Recording) -> list[str]:
+def _pressure(recording: Recording, rig: Rig) -> list[str]:
     if recording.pressure is None:
         return []
     free = ~recording.valve_closed & ~recording.filled
@@ -70,7 +80,7 @@ def _pressure(recording: Recording) -> list[str]:
         return []
     highest = float(np.quantile(recording.pressure[free], 0.995)) / BAR
     command = float(np.quantile(recording.command[free], 0.995)) / BAR
-    if highest > HIGHEST:
+    if highest > _limit(rig):
         return [f"pressure_bar goes up to {highest:.4g}; {_advice(highest, command)}"]
     if command > 1.0 and highest < 0.25 * command:
         return [

@@ -38,23 +38,29 @@ def causes_in(folder: str | Path) -> tuple[Cause, ...]:
     return tuple(sorted(made, key=lambda cause: cause.name))
 
 
-def by_name(name: str) -> Cause:
-    """Return one cause of the catalogue."""
-    for cause in catalogue():
+def by_name(name: str, causes: Sequence[Cause] | None = None) -> Cause:
+    """Return one cause by its name, by default of the catalogue."""
+    every = catalogue() if causes is None else causes
+    for cause in every:
         if cause.name == name:
             return cause
-    raise ValueError(f"no cause named {name!r}{near(name, [c.name for c in catalogue()])}")
+    raise ValueError(f"no cause named {name!r}{near(name, [c.name for c in every])}")
 
 
-def selected(given: Sequence[Cause | str] | None = None) -> tuple[Cause, ...]:
-    """Return the given causes, with names looked up; the whole catalogue by default."""
+def selected(
+    given: Sequence[Cause | str] | None = None, causes: Sequence[Cause] | None = None
+) -> tuple[Cause, ...]:
+    """Return the given causes, with names looked up among ``causes``; all of them by default.
+
+    The default of ``causes`` is the catalogue.
+    """
     if given is None:
-        return catalogue()
+        return catalogue() if causes is None else tuple(causes)
     if isinstance(given, str):
         raise TypeError(f"causes is {given!r}; give a list of causes or names")
     made: list[Cause] = []
     for one in given:
-        cause = by_name(one) if isinstance(one, str) else one
+        cause = by_name(one, causes) if isinstance(one, str) else one
         if not isinstance(cause, Cause):
             raise TypeError(f"causes holds {one!r}; give a Cause or the name of one")
         if cause.name in {c.name for c in made}:

@@ -1,6 +1,6 @@
 """Isolability and testability of causes, simulated before any residual is used."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.audit.audit import undecidable
+from pam_envs.diagnosis.audit.audit import undecidable, unmet_needs
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS, EVERY
 from pam_envs.diagnosis.fit.candidate import initial_fits
@@ -167,9 +167,14 @@ def not_testable(
     causes: Sequence[Cause],
     recording: Recording,
     sheet: Rig,
+    unmet: Mapping[str, str] | None = None,
 ) -> tuple[Isolability, dict[str, str]]:
-    """Return the isolability of the causes, and the reason for each that is not testable."""
-    reasons = undecidable(recording, sheet, causes)
+    """Return the isolability of the causes, and the reason for each that is not testable.
+
+    ``unmet`` are the needs that the recording does not meet; default: of a single muscle.
+    """
+    unmet = unmet_needs(recording, sheet) if unmet is None else unmet
+    reasons = undecidable(recording, sheet, causes, unmet)
     present = {f.name for f in base.frees}
     for cause in causes:
         if all(any(t.name in present for t in form.terms) for form in cause.forms):
@@ -177,7 +182,7 @@ def not_testable(
     left = [c for c in causes if c.name not in reasons]
     found = isolability(problem, family, base, left)
     reasons |= _too_small(found, left)
-    if recording.pressure is None:
+    if "pressure" in unmet:
         for name, other in lookalikes(found, left).items():
             reasons.setdefault(name, f"cannot be separated from {other} without pressure_bar")
     return found, {c.name: reasons[c.name] for c in causes if c.name in reasons}
@@ -190,12 +195,13 @@ def unseen_rivals(
     causes: Sequence[Cause],
     recording: Recording,
     sheet: Rig,
+    unmet: Mapping[str, str] | None = None,
 ) -> list[Cause]:
     """Return the causes that lack their experiment, but would show on the recording.
 
     None of them can be named, and a cause that looks like one of them is in doubt.
     """
-    reasons = undecidable(recording, sheet, causes)
+    reasons = undecidable(recording, sheet, causes, unmet)
     lacking = [c for c in causes if c.name in reasons]
     found = isolability(problem, family, base, lacking)
     small = _too_small(found, lacking)

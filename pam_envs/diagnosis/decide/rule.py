@@ -14,7 +14,7 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "5"  # part of every report
+    version: str = "6"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     trial_penalty: float = (
@@ -26,7 +26,8 @@ class Rule:
     peak: float = 30.0
     excess: float = 1.6
     # removed share of the excess below which structure is unexplained; where this share of a
-    # spectral peak remains, what oscillates has no name yet, and the share must be larger
+    # spectral peak remains at its frequency, what oscillates has no name yet, and the share must be
+    # larger
     explained: float = 0.5
     lasting: float = 0.5
     explained_with_peak: float = 0.9
@@ -57,6 +58,8 @@ class Rule:
     draws: int = 400  # bootstrap samples
 
 
+SAME_FREQUENCY = 0.1
+"""Relative difference of frequencies that are the same."""
 LITTLE = 0.3
 """Mean square above the noise of which no share is judged."""
 
@@ -84,14 +87,23 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
         level += 1
     found = levels[level]
     if has_structure(found["left"], rule):
-        height = max(rule.peak, rule.lasting * levels[0]["left"]["peak"])
-        lasts = found["left"]["peak"] > height
+        lasts = oscillates_still(levels[0]["left"], found["left"], rule)
         if explained_fraction(levels[0], found) < (
             rule.explained_with_peak if lasts else rule.explained
         ):
             return Judgement("unexplained", level)
     still = not_excluded(found["rivals"], rule)
     return Judgement("ambiguous" if still else "named", level, still)
+
+
+def oscillates_still(before: Mapping[str, Any], after: Mapping[str, Any], rule: Rule) -> bool:
+    """Return whether a spectral peak remains in a channel, at the same frequency."""
+    return any(
+        was > rule.peak
+        and now > max(rule.peak, rule.lasting * was)
+        and abs(frequency - known) < SAME_FREQUENCY * known
+        for (known, was), (frequency, now) in zip(before["peaks"], after["peaks"], strict=True)
+    )
 
 
 def has_structure(left: dict[str, Any], rule: Rule) -> bool:

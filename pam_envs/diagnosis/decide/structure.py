@@ -32,6 +32,12 @@ class Regressors:
 
     values: dict[str, Array]
     features: Array
+    drive: str = "pressure"  # name of the driving signal
+
+    @property
+    def motion(self) -> Array:
+        """Simulated driving signal, whose spectrum is that of the experiment, shape (T,)."""
+        return self.values[self.drive]
 
     @classmethod
     def make(
@@ -41,8 +47,12 @@ class Regressors:
         outputs: Array,
         load: Array,
         temperature: Array | None,
+        drive: str = "pressure",
     ) -> "Regressors":
-        """Return the regressors of a recording and the simulated outputs (2, T)."""
+        """Return the regressors of a recording and the simulated outputs (2, T).
+
+        The outputs are the motion, and the driving signal of the size of a pressure [Pa].
+        """
         x, p = outputs
         period = float(time[1] - time[0])
         rate = np.gradient(p, period)
@@ -51,7 +61,7 @@ class Regressors:
         values = {
             "direction": direction_of(p),
             "rate": rate,
-            "pressure": p,
+            drive: p,
             "load": load,
             "time_since_reversal": since(turns, period),
             "time": time,
@@ -59,7 +69,7 @@ class Regressors:
         }
         if temperature is not None:
             values["temperature"] = temperature
-        return cls(values, _features(command, x, values))
+        return cls(values, _features(command, x, values, drive), drive)
 
 
 def direction_of(pressure: Array) -> Array:
@@ -103,8 +113,8 @@ def low_pass(signal: Array, tau: float, period: float) -> Array:
     return np.asarray(filtered)
 
 
-def _features(command: Array, x: Array, values: dict[str, Array]) -> Array:
-    time, load, p = values["time"], values["load"], values["pressure"]
+def _features(command: Array, x: Array, values: dict[str, Array], drive: str) -> Array:
+    time, load, p = values["time"], values["load"], values[drive]
     temperature = values.get("temperature")
     period = float(time[1] - time[0])
     way = values["direction"]

@@ -60,7 +60,7 @@ def remaining_structure(
         share = flexible_r2(np.where(np.isfinite(reading), row, np.nan), regressors, blocks)
         r2.append(share)
         rest -= float(np.log(1.0 - min(share, 0.999)))
-        peaks.append(spectral_peak(row, period, regressors.values["pressure"]))
+        peaks.append(spectral_peak(row, period, regressors.motion))
     some = blocks.counts.sum(axis=1) > 0
     means = blocks.means(candidate.errors)
     by_channel = [float(v) if s else 0.0 for v, s in zip(means, some, strict=True)]

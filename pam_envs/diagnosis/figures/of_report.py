@@ -59,10 +59,12 @@ def structure(report: tv.Report) -> cv.Picture | None:
     channels = tv.reported(before)
     if not channels:
         return None
+    own = [n for c in channels for n in before[c].get("r2") or {} if n not in AGAINST]
+    against = {**AGAINST, **{n: n.replace("_", " ") for n in own}}
     names = [
-        n for n in AGAINST if any((before[c].get("r2") or {}).get(n) is not None for c in channels)
+        n for n in against if any((before[c].get("r2") or {}).get(n) is not None for c in channels)
     ]
-    panels = Columns([*(AGAINST[n] for n in names), "all of these together"], channels, 26.0)
+    panels = Columns([*(against[n] for n in names), "all of these together"], channels, 26.0)
     both, most = tv.changed(report), 0.1
     for channel, ax in panels.axes.items():
         bars = [(before, -0.19 if both else 0.0, cv.BASE)]
@@ -202,7 +204,7 @@ def kinds(report: tv.Report) -> cv.Picture | None:
             ax.axvline(noise, **LIMIT)
         errors = np.array([*old, *new, noise or 0.0])
         ax.set_xlim(0.0, 1.08 * np.nanmax(errors) or 1.0)
-        ax.set_xlabel(f"error [{tv.UNITS[channel][0]} RMS]")
+        ax.set_xlabel(f"error [{before[channel].get('unit')} RMS]")
     legend = cv.legend_of(both, "error", "before", "after", "dot")
     panels.canvas.legend([*legend, NOISE_FLOOR], panels.left)
     return panels.canvas.picture(

@@ -104,7 +104,7 @@ def replay(report: tv.Report, view: tv.View) -> cv.Picture | None:
         below.append(("load\n[N]", view.load))
     if view.temperature is not None:
         below.append(("temp.\n[°C]", view.temperature))
-    rows = [(tv.unit_label(channel), 170.0) for channel in view.channels]
+    rows = [(tv.unit_label(view, channel), 170.0) for channel in view.channels]
     canvas, axes = strips(view, [*rows, *((label, 52.0) for label, _ in below)])
     for channel, ax in zip(view.channels, axes, strict=False):
         models(ax, view, channel, slice(None))
@@ -139,7 +139,7 @@ def zoom(report: tv.Report, view: tv.View) -> cv.Picture | None:
     for (left, _), span in zip(grid[0], spans, strict=True):
         canvas.title(left, top - 6.0, tv.short(span.name, int(width / 8.0)))
     for channel, row in zip(view.channels, grid, strict=True):
-        row[0][1].set_ylabel(tv.unit_label(channel))
+        row[0][1].set_ylabel(tv.unit_label(view, channel))
         for (_, ax), rows in zip(row, windows, strict=True):
             models(ax, view, channel, rows, 4.0)
             ax.margins(x=0.0, y=0.08)
@@ -157,7 +157,9 @@ def zoom(report: tv.Report, view: tv.View) -> cv.Picture | None:
 
 def residual(report: tv.Report, view: tv.View) -> cv.Picture | None:
     """Draw the residual of each output over time, with the noise band."""
-    canvas, axes = strips(view, [(tv.unit_label(channel), 150.0) for channel in view.channels])
+    canvas, axes = strips(
+        view, [(tv.unit_label(view, channel), 150.0) for channel in view.channels]
+    )
     banded = False
     for channel, ax in zip(view.channels, axes, strict=True):
         shown = view.residuals(channel)
@@ -192,13 +194,13 @@ def effects(report: tv.Report, view: tv.View) -> cv.Picture | None:
         (tv.short(cause.get("title") or cause["name"], 60), channel, traces[channel])
         for cause in report.get("causes") or []
         for traces in [view.effects.get(cause["name"]) or {}]
-        for channel in _seen(report, traces)
+        for channel in _seen(report, view, traces)
     ]
     if not rows:
         return None
     canvas, axes = strips(
         view,
-        [(tv.unit_label(channel), 120.0) for _, channel, _ in rows],
+        [(tv.unit_label(view, channel), 120.0) for _, channel, _ in rows],
         ROW + 16.0,
         [f"{title}: {channel}" for title, channel, _ in rows],
     )
@@ -215,7 +217,7 @@ def effects(report: tv.Report, view: tv.View) -> cv.Picture | None:
     )
 
 
-def _seen(report: tv.Report, effect: dict[str, Array]) -> list[str]:
+def _seen(report: tv.Report, view: tv.View, effect: dict[str, Array]) -> list[str]:
     """Return the channels on which an effect exceeds a tenth of the noise, or is largest."""
 
     def size(channel: str) -> float:
@@ -223,13 +225,13 @@ def _seen(report: tv.Report, effect: dict[str, Array]) -> list[str]:
         rms = float(np.sqrt(np.nanmean(effect[channel] ** 2)))
         return rms / noise if noise else float(rms > 0)
 
-    channels = [c for c in tv.CHANNELS if c in effect]
+    channels = [c for c in view.units if c in effect]
     return [c for c in channels if size(c) >= 0.1] or sorted(channels, key=size)[-1:]
 
 
 def scatter(report: tv.Report, view: tv.View) -> cv.Picture | None:
     """Draw the residual against pressure, coloured by direction."""
-    drive = view.base.get("pressure", view.command)
+    label, drive = view.drive or ("pressure [bar]", view.base.get("pressure", view.command))
     if drive is None or np.nanmax(drive) <= np.nanmin(drive):
         return None
     height, top = 190.0, cv.LEGEND + 16.0
@@ -239,7 +241,7 @@ def scatter(report: tv.Report, view: tv.View) -> cv.Picture | None:
         shown = view.residuals(channel)
         box = tv.limits([np.nanpercentile(rest, [0.05, 99.95]) for rest in shown], 0.1)
         panels = canvas.row(len(shown), top + j * (height + 16.0), height, 20.0, 2)
-        panels[0][1].set_ylabel(f"{channel} residual [{tv.UNITS[channel][0]}]")
+        panels[0][1].set_ylabel(f"{channel} residual [{view.units[channel][0]}]")
         for i, (rest, (left, ax)) in enumerate(zip(shown, panels, strict=True)):
             for sign, colour in ((1, cv.RISING), (-1, cv.FALLING)):
                 rows = np.flatnonzero((turn == sign) & np.isfinite(rest))
@@ -254,7 +256,7 @@ def scatter(report: tv.Report, view: tv.View) -> cv.Picture | None:
             if j == 0 and len(shown) > 1:
                 canvas.title(left, top - 8.0, ("before", "after")[i])
             if channel == view.channels[-1]:
-                ax.set_xlabel("pressure [bar]")
+                ax.set_xlabel(label)
     canvas.legend(
         [
             ("dot", "inflating", {"color": cv.RISING, "markersize": 7}),
@@ -264,7 +266,8 @@ def scatter(report: tv.Report, view: tv.View) -> cv.Picture | None:
     )
     return canvas.picture(
         "scatter",
-        f"residual of {' and '.join(view.channels)} against pressure, by direction of motion",
+        f"residual of {' and '.join(view.channels)} against "
+        f"{label.partition(' [')[0]}, by direction of motion",
         "Separate lines show a simulated loop that is too wide or too narrow, parallel bends an "
         "error of the static curve; two flat lines at zero show neither.",
     )
@@ -274,7 +277,10 @@ def loops(report: tv.Report, view: tv.View) -> cv.Picture | None:
     """Draw one output over the pressure that drives it, in up to three segments."""
     output = view.channels[0]
     over_pressure = output == "contraction" and "pressure" in view.base
+    label = "pressure [bar]" if over_pressure else "commanded pressure [bar]"
     drive = view.base["pressure"] if over_pressure else view.command
+    if view.drive is not None:
+        label, drive = view.drive
     spans = [] if drive is None else tv.loop_spans(view, drive, PANELS)
     if drive is None or not spans:
         return None
@@ -282,7 +288,7 @@ def loops(report: tv.Report, view: tv.View) -> cv.Picture | None:
     canvas = cv.Canvas(top + height + 40.0)
     box = tv.limits([side[output][s.rows] for side in (view.measured, view.base) for s in spans])
     panels = canvas.row(len(spans), top, height, 22.0, PANELS)
-    panels[0][1].set_ylabel(tv.unit_label(output))
+    panels[0][1].set_ylabel(tv.unit_label(view, output))
     for span, (left, ax) in zip(spans, panels, strict=True):
         rows = tv.along(drive, view.base[output], span, 900)
         for side, colour, wide in (
@@ -295,7 +301,7 @@ def loops(report: tv.Report, view: tv.View) -> cv.Picture | None:
                 style = {"color": colour, "linewidth": wide, "solid_joinstyle": "round"}
                 ax.plot(over[rows], side[output][rows], **style)
         ax.set_ylim(box)
-        ax.set_xlabel("pressure [bar]" if over_pressure else "commanded pressure [bar]")
+        ax.set_xlabel(label)
         canvas.title(left, cv.LEGEND + 8.0, tv.short(span.name, 28))
         load = "" if view.load is None else f"{np.nanmean(view.load[span.rows]):.3g} N, "
         note = load + ("held out" if span.held_out else "fitted")

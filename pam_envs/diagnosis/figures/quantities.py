@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from pam_envs.arrays import Array
 
-CHANNELS = ("contraction", "pressure")
-UNITS = {"contraction": ("mm", 1e3), "pressure": ("bar", 1e-5)}
-"""Display unit of each output, and its factor from SI."""
+UNITS = {"contraction": ("mm", 1e-3), "pressure": ("bar", 1e5)}
+"""Unit of each output of a single muscle, and the unit in SI."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +41,13 @@ class View:
     command: Array | None
     load: Array | None
     temperature: Array | None
+    units: Mapping[str, tuple[str, float]]
+    drive: tuple[str, Array] | None  # label and values of the driving signal, if it is no output
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Measured and simulated outputs, contraction first."""
-        return tuple(c for c in CHANNELS if c in self.measured and c in self.base)
+        """Measured and simulated outputs, the motion first."""
+        return tuple(c for c in self.units if c in self.measured and c in self.base)
 
     @property
     def end(self) -> float:
@@ -54,7 +55,7 @@ class View:
         return float(2.0 * self.clock[-1] - self.clock[-2])
 
     def residuals(self, channel: str) -> list[Array]:
-        """Return measured less simulated [mm or bar], before and, if any, after the extension."""
+        """Return measured less simulated, in display units, before and after an extension."""
         models = [model for model in (self.base, self.extended) if channel in model]
         return [self.measured[channel] - model[channel] for model in models]
 
@@ -63,19 +64,22 @@ class View:
         """Convert the time series of a diagnosis from SI to display units."""
         segment = np.asarray(traces.segment, dtype=np.int64)
         command = _optional(traces.command)
-        base, extended = _shown(traces.base), _shown(traces.extended)
+        units = dict(getattr(traces, "units", None) or UNITS)
+        base, extended = _shown(traces.base, units), _shown(traces.extended, units)
         if all(c in base and np.array_equal(extended[c], base[c], True) for c in extended):
             extended = {}  # no extension
         return cls(
             clock=elapsed(np.asarray(traces.time)),
             spans=spans_of(segment, traces.segments, np.asarray(traces.held_out, dtype=bool)),
-            measured=_shown(traces.measured),
+            measured=_shown(traces.measured, units),
             base=base,
             extended=extended,
-            effects={name: _shown(effect) for name, effect in traces.effects.items()},
-            command=None if command is None else command * UNITS["pressure"][1],
+            effects={name: _shown(effect, units) for name, effect in traces.effects.items()},
+            command=None if command is None else command / UNITS["pressure"][1],
             load=_optional(traces.load),
             temperature=_optional(traces.temperature),
+            units=units,
+            drive=getattr(traces, "drive", None),
         )
 
 
@@ -86,9 +90,11 @@ def _optional(values: Any) -> Array | None:
     return array if np.isfinite(array).any() else None
 
 
-def _shown(outputs: Mapping[str, Any] | None) -> dict[str, Array]:
-    found = {c: _optional((outputs or {}).get(c)) for c in CHANNELS}
-    return {c: array * UNITS[c][1] for c, array in found.items() if array is not None}
+def _shown(
+    outputs: Mapping[str, Any] | None, units: Mapping[str, tuple[str, float]]
+) -> dict[str, Array]:
+    found = {c: _optional((outputs or {}).get(c)) for c in units}
+    return {c: array / units[c][1] for c, array in found.items() if array is not None}
 
 
 def elapsed(time: Array) -> Array:
@@ -201,9 +207,9 @@ def loop_spans(view: View, drive: Array, most: int = 3) -> list[Span]:
     return sorted(chosen, key=lambda s: s.start)
 
 
-def unit_label(channel: str) -> str:
+def unit_label(view: View, channel: str) -> str:
     """Return "contraction [mm]" or "pressure [bar]"."""
-    return f"{channel} [{UNITS[channel][0]}]"
+    return f"{channel.replace('_', ' ')} [{view.units[channel][0]}]"
 
 
 def limits(values: Iterable[Array], margin: float = 0.06) -> tuple[float, float]:
@@ -266,7 +272,7 @@ def changed(report: Report) -> bool:
 
 def reported(quantities: Mapping[str, Any] | None) -> list[str]:
     """Return the channels in a report."""
-    return [c for c in CHANNELS if (quantities or {}).get(c)]
+    return [c for c, found in (quantities or {}).items() if found]
 
 
 def gain_to_floor(report: Report) -> float | None:

@@ -6,7 +6,7 @@ contraction. The result only starts a fit, since the regressors contain noise.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -32,6 +32,8 @@ LEAST_STIFF = 0.15  # least stiffness of a weight, over the median
 BREAKS_IN_LENGTH, GROWTHS = (0.003, 0.01, 0.03, 0.09), (0.0, 4e-6, 1.5e-5)
 """Tried strains over which friction of the length builds up, and its growths with pressure
 [1/Pa]."""
+BRAIDS = (0.008, 0.015, 0.06)
+"""Tried strains over which the resistance of the braid falls."""
 BREAKS_IN_PRESSURE = (1e4, 3e4, 1e5)
 """Tried pressures over which friction of the pressure yields [Pa]."""
 RATIOS = (0.0, 1.0)
@@ -103,12 +105,13 @@ class Balance:
     path: Array  # (T,): strain, smoothed
     drive: Array  # (T,): pressure [Pa]
     noise: float  # of the contraction [m]
+    braid: float  # strain over which the braid's resistance falls
 
     @classmethod
     def of(
         cls, family: MuscleFamily, contraction: Array, pressure: Array, noise: float
     ) -> "Balance | None":
-        """Return the slow samples; None if they are too few.
+        """Return the slow samples, and the braid that fits them best; None if they are too few.
 
         ``contraction`` (T,) are readings [m], NaN where there is none, ``pressure`` (T,) is
         simulated [Pa].
@@ -131,7 +134,11 @@ class Balance:
         path, force = smooth / plant.muscle.rest_length, load[rows] * GRAVITY
         speed = (speed / plant.muscle.rest_length)[rows]
         near = path[rows], pressure[rows], force, gaps, speed
-        return cls(family, rows, *near, path, pressure, noise)
+        made = cls(family, rows, *near, path, pressure, noise, plant.muscle.braid_strain)
+        other = (replace(made, braid=strain) for strain in BRAIDS)
+        best = min(other, key=lambda balance: balance._finer[0].error)
+        helps = best._finer[0].error < (1.0 - LEAST_GAIN) * made._finer[0].error
+        return best if helps else made
 
     def solve(self) -> dict[str, float]:
         """Return coefficients of the static law and play weights."""
@@ -149,8 +156,9 @@ class Balance:
             taper, stiff = self._slopes(found.coefficients)
         return found, taper, stiff
 
-    def flexible(self) -> dict[str, float]:
-        """Return coefficients with the map, and with the friction that reduces the error.
+    @cached_property
+    def _finer(self) -> tuple[Solution, list[Friction]]:
+        """Solution with the map, and with the friction that reduces the error.
 
         Friction of each kind is added as long as it helps: strands and yielding elements.
         """
@@ -184,12 +192,16 @@ class Balance:
                 break
             chosen.append(least)
             best = solved[least]
-        c = best.coefficients
-        found = self._named(c[: first - len(maps)])
-        sizes = zip(MAP_SIZES, c[first - len(maps) : first], strict=True)
-        found |= {f"muscle.{name}": float(size) for name, size in sizes}
-        at = first
-        for friction in (tried[k] for k in chosen):
+        return best, [tried[k] for k in chosen]
+
+    def flexible(self) -> dict[str, float]:
+        """Return coefficients with the map and with further friction."""
+        solved, frictions = self._finer
+        c, first = solved.coefficients, len(LAW) + len(self.gaps) + 2
+        found = self._named(c[:first])
+        at = first + len(MAP_SIZES)
+        found |= {f"muscle.{k}": float(c) for k, c in zip(MAP_SIZES, c[first:at], strict=True)}
+        for friction in frictions:
             values = c[at : at + len(friction.names)]
             found |= friction.fixed | dict(zip(friction.names, map(float, values), strict=True))
             if friction.growth:
@@ -230,7 +242,7 @@ class Balance:
     def _law(self) -> Array:
         """Return the terms of the static law, in the order of :data:`LAW`, (terms, n)."""
         e, p = self.strain, self.pressure
-        bend = -np.expm1(-e / self.family.plant.muscle.braid_strain)
+        bend = -np.expm1(-e / self.braid)
         return np.array([p, -e * p, -(e**2) * p, -bend, -e, -(e**2), -(e**3), -(e**4)])
 
     def _plays(self, taper: Array) -> Array:
@@ -263,10 +275,10 @@ class Balance:
 
     def _slopes(self, c: Array) -> tuple[Array, Array]:
         """Return the taper of the area and the stiffness over strain [N] of a static law."""
-        law, e, p = self.family.plant.muscle, self.strain, self.pressure
-        bend = np.exp(-e / law.braid_strain)
+        e, p = self.strain, self.pressure
+        bend = np.exp(-e / self.braid)
         taper = np.clip((c[1] * e + c[2] * e**2) / max(c[0], 1e-6), -1.0, 0.95)
-        stiff = (c[1] + 2.0 * c[2] * e) * p + c[3] / law.braid_strain * bend
+        stiff = (c[1] + 2.0 * c[2] * e) * p + c[3] / self.braid * bend
         stiff += c[4] + 2.0 * c[5] * e + 3.0 * c[6] * e**2 + 4.0 * c[7] * e**3
         return taper, np.maximum(stiff, 1.0)
 
@@ -279,6 +291,7 @@ class Balance:
             "muscle.area_taper": float(c[1]) / area,
             "muscle.area_curve": float(c[2]) / area,
             "muscle.braid_force": max(float(c[3]), 1e-3),
+            "muscle.braid_strain": self.braid,
         }
         plays = c[n : n + len(self.gaps)]
         return found | {f"hysteresis.weight[{k}]": float(v) / area for k, v in enumerate(plays)}

@@ -20,8 +20,17 @@ from pam_envs.diagnosis.fit.least_squares import (
     evaluate,
     improve,
 )
-from pam_envs.diagnosis.fit.single_muscle import CLOCK, LAG, ORIFICES, PILOT, MuscleFamily
+from pam_envs.diagnosis.fit.single_muscle import (
+    CLOCK,
+    LAG,
+    ORIFICES,
+    PILOT,
+    MuscleFamily,
+    spanning,
+    states_of,
+)
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.flow import REPLACED
 
@@ -59,8 +68,9 @@ def calibrate(
     the forms of a limited rate that the regulator may have.
     """
     extra = np.zeros((0, 0)) if shapes is None else shapes
-    longest = float(np.nanmax(measured[0], initial=0.0))
-    family = dataclasses.replace(family, longest=longest)
+    pressure = np.where(np.isfinite(measured[1]), measured[1], np.maximum(0, family.inputs.command))
+    states = states_of(measured[0], pressure, family.plant)
+    family = dataclasses.replace(family, plant=spanning(family.plant, states), states=states)
     problem = Problem(
         family.simulate,
         measured,
@@ -94,6 +104,12 @@ def calibrate(
         slow = Balance.of(family, measured[0], pressure, noise[0])
         if slow is not None:
             law, wide = slow.solve(), slow.flexible()
+            plant = family.plant.replace({"muscle.braid_strain": slow.braid})
+            family = dataclasses.replace(family, plant=plant)
+            column[R.MUSCLE_BRAID_STRAIN] = slow.braid
+            problem = dataclasses.replace(
+                problem, simulate=family.simulate, tie=family.tie, violations=family.violations
+            )
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column

@@ -81,18 +81,18 @@ def polish(problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH) 
     """Improve fits in all their parameters, at first with the Jacobian of their base."""
     for fit in fits:
         if fit.shared is not None and len(fit.slopes):
-            fit.slopes = np.vstack([fit.shared.slopes, fit.slopes[:, : problem.seen]])
+            fit.take(np.vstack([fit.shared.slopes, fit.slopes[:, : problem.seen]]))
         elif len(fit.slopes) != len(fit.frees):
-            fit.slopes = fit.slopes[:0]
-        fit.done, fit.damping, fit.shared, fit.fresh = False, 1.0, None, False
+            fit.take(fit.slopes[:0])
+        fit.done, fit.damping, fit.shared = False, 1.0, None
     lsq.improve(problem, fits, rounds, POLISHED_ENOUGH)
 
 
 def complete_jacobian(problem: lsq.Problem, fit: lsq.Fit) -> None:
-    """Compute the Jacobian of a fit by all its parameters, if it is missing."""
-    if fit.shared is not None or not fit.fresh:
-        fit.shared = None
-        lsq.differentiate(problem, [fit])
+    """Compute what is missing of the Jacobian of a fit by all its parameters, on all samples."""
+    whole = fit.shared is None and fit.slopes.shape[1] == len(fit.residual)
+    fit.shared = None
+    lsq.differentiate(problem, [fit], 1 if whole else 0)
 
 
 def fit_base(
@@ -132,7 +132,7 @@ def refit(
         and old.shared is None
         and old.slopes.shape == (len(old.frees), len(old.residual))
     ):
-        fit.slopes = before.carried(old.slopes, problem)
+        fit.take(before.carried(old.slopes, problem))
     lsq.evaluate(problem, [fit])
     lsq.improve(problem, [fit], rounds, 1e-5, renew=before is None)
     return Candidate(candidate.causes, fit, blocks.errors(problem.rows(fit.residual)))
@@ -149,8 +149,8 @@ def best_by_name(fits: Iterable[tuple[str, lsq.Fit]]) -> dict[str, lsq.Fit]:
 
 def restarted(fit: lsq.Fit, **changes: Any) -> lsq.Fit:
     """Return a copy of a fit in its initial state."""
-    empty = np.zeros((0, 0))
-    anew = replace(fit, done=False, damping=1.0, begins={}, slopes=empty, fresh=False)
+    anew = replace(fit, done=False, damping=1.0, begins={})
+    anew.take(np.zeros((0, 0)))
     return replace(anew, **changes)
 
 
@@ -179,7 +179,7 @@ def without_each_cause(
         of_base = np.array([known.get(f.name, v) for f, v in zip(frees, z, strict=True)])
         for start in (z, of_base):
             fit = restarted(model.fit, frees=frees, z=start.copy(), shared=None)
-            fit.slopes = model.fit.slopes[kept]
+            fit.take(model.fit.slopes[kept])
             fits.append(fit)
             labels.append(removed.name)
     if not fits:

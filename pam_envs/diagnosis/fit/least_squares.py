@@ -4,8 +4,8 @@ A *column* holds all parameters of a plant; a *free* parameter is changed by a f
 or tried parameter set is a lane of one replay. Fits that share their first free parameters (the
 base) and differ in a few more (a cause) share the base's Jacobian, computed once at the base's
 optimum: near it the steps are close to Gauss-Newton, at a tenth of the simulations. A fit with a
-Jacobian of its own follows it by secant updates (broyden1965) and computes it again when they no
-longer help.
+Jacobian of its own follows it by secant updates (broyden1965); lanes of a replay that no step uses
+compute its oldest columns again, and all of it is computed again when the updates no longer help.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +21,8 @@ DAMPINGS = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.3)
 """Levenberg-Marquardt dampings tried side by side, each in a lane of the replay."""
 FEW_DAMPINGS = (1e-6, 1e-3, 0.3)
 LEAST_DAMPING = 1e-9  # regularisation of the normal equations
-RENEWED = 4  # number of secant updates after which a Jacobian is computed again
+RENEWED = 5  # number of secant updates after which a column of a Jacobian is computed again
+LANES = 16  # columns that a replay computes at the cost of one
 STALLED = 1e3  # factor on all dampings after a round without improvement
 REACH_LOG, REACH = 1.0, 30.0  # longest steps in internal coordinates
 SHAPE_PRIOR = 50.0
@@ -132,8 +133,8 @@ class Fit:
     residual: Array = field(default_factory=lambda: np.zeros(0))  # (m,): simulated less measured
     slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, m): by the last k of z;
     # of a fit with secant updates perhaps on training samples only
-    fresh: bool = False  # whether the slopes are differences at z, not secant updates
-    age: int = 0  # number of secant updates since
+    # (k,): number of steps since each of the slopes was computed by differences
+    ages: Indices = field(default_factory=lambda: np.zeros(0, np.int64))
     shared: Shared | None = None  # derivatives by the coordinates before them
     damping: float = 1.0  # factor on the dampings of the next round
     done: bool = False  # whether the fit has converged or was stopped
@@ -144,6 +145,15 @@ class Fit:
     def at_start(cls, frees: tuple[Free, ...], column: Array) -> "Fit":
         """Return a fit at the starting values of its parameters."""
         return cls(frees, np.array([f.inner(f.start) for f in frees]), column)
+
+    def take(self, slopes: Array) -> None:
+        """Take slopes at other coordinates as a first approximation."""
+        self.slopes, self.ages = slopes, np.ones(len(slopes), np.int64)
+
+    @property
+    def fresh(self) -> bool:
+        """Whether all slopes are differences at the present coordinates."""
+        return len(self.slopes) > 0 and not self.ages.any()
 
     @property
     def held(self) -> int:
@@ -294,41 +304,82 @@ def shifted(fit: Fit, k: int) -> tuple[Array, float]:
     return z, step
 
 
-def differentiate(problem: Problem, fits: Sequence[Fit]) -> None:
-    """Compute the Jacobian of each fit by its parameters without a shared Jacobian."""
-    columns, steps = [], []
+@dataclass(frozen=True)
+class Differences:
+    """Columns of a fit's Jacobian that are computed by differences."""
+
+    fit: Fit
+    places: list[int]  # among the parameters without a shared Jacobian
+
+    @cached_property
+    def shifts(self) -> list[tuple[Array, float]]:
+        """Shifted coordinates of each column, and the shift."""
+        return [shifted(self.fit, self.fit.held + k) for k in self.places]
+
+    def columns(self) -> list[Array]:
+        """Return the parameter columns to simulate."""
+        return [column_of(self.fit, z) for z, _ in self.shifts]
+
+    def write(self, found: Array) -> None:
+        """Write the slopes from the residuals of the columns."""
+        if not self.places:
+            return
+        fit, steps = self.fit, np.array([step for _, step in self.shifts])
+        width = fit.slopes.shape[1]
+        fit.slopes[self.places] = (found - fit.residual)[:, :width] / steps[:, None]
+        fit.ages[self.places] = 0
+
+
+def differentiate(problem: Problem, fits: Sequence[Fit], least: int = 0) -> None:
+    """Compute the Jacobian of each fit by its parameters without a shared Jacobian.
+
+    Columns that are younger than ``least`` steps remain as they are.
+    """
+    made = []
     for fit in fits:
-        for k in range(fit.held, len(fit.frees)):
-            z, step = shifted(fit, k)
-            columns.append(column_of(fit, z))
-            steps.append(step)
+        own = len(fit.frees) - fit.held
+        if len(fit.slopes) != own or least == 0:
+            fit.slopes = np.empty((own, len(fit.residual)))
+            fit.ages = np.full(own, least)
+        made.append(Differences(fit, list(np.flatnonzero(fit.ages >= least))))
+    _simulate(problem, [], made)
+
+
+def _simulate(problem: Problem, tried: list[Array], made: Sequence[Differences]) -> Array:
+    """Return the residuals of tried columns, and write those of differences simulated with them."""
+    columns = tried + [column for part in made for column in part.columns()]
     found = problem.residuals(np.array(columns)) if columns else np.zeros((0, 0))
-    at = 0
-    for fit in fits:
-        n = len(fit.frees) - fit.held
-        if n == 0:
-            fit.slopes = np.zeros((0, len(fit.residual)))
-            continue
-        fit.slopes = (found[at : at + n] - fit.residual) / np.array(steps[at : at + n])[:, None]
-        fit.fresh, fit.age = True, 0
-        at += n
+    at = len(tried)
+    for part in made:
+        part.write(found[at : at + len(part.places)])
+        at += len(part.places)
+    return found[: len(tried)]
+
+
+def _in_spare_lanes(fits: Sequence[Fit], used: int) -> list[Differences]:
+    """Return the oldest columns of the fits' own Jacobians, as many as lanes are left."""
+    places: dict[int, list[int]] = {}
+    own = [(k, i) for k, fit in enumerate(fits) if not fit.held for i in np.flatnonzero(fit.ages)]
+    own.sort(key=lambda at: -fits[at[0]].ages[at[1]])
+    for k, i in own[: -used % LANES]:
+        places.setdefault(k, []).append(int(i))
+    return [Differences(fits[k], found) for k, found in places.items()]
 
 
 def share(problem: Problem, fit: Fit) -> Shared:
     """Return the Jacobian of a fit for sharing with fits that extend it."""
     slopes = np.ascontiguousarray(fit.slopes[:, : problem.seen])
-    return Shared(slopes, np.einsum("im,jm->ij", slopes, slopes))
+    return Shared(slopes, slopes @ slopes.T)
 
 
 def normal_equations(problem: Problem, fit: Fit) -> tuple[Array, Array]:
     """Return the matrix and the gradient of the normal equations, priors included."""
     own, residual = fit.slopes[:, : problem.seen], fit.residual[: problem.seen]
-    normal = np.einsum("im,jm->ij", own, own)
-    gradient = np.einsum("im,m->i", own, residual)
+    normal, gradient = own @ own.T, own @ residual
     if fit.shared is not None:
-        across = np.einsum("im,jm->ij", own, fit.shared.slopes)
+        across = own @ fit.shared.slopes.T
         normal = np.block([[fit.shared.gram, across.T], [across, normal]])
-        gradient = np.concatenate([np.einsum("im,m->i", fit.shared.slopes, residual), gradient])
+        gradient = np.concatenate([fit.shared.slopes @ residual, gradient])
     table = fit.table
     normal[np.diag_indices(len(fit.z))] += table.precision
     gradient += (fit.z - table.start) * table.precision
@@ -391,9 +442,11 @@ def improve(
         if not active:
             return
         differentiate(problem, [f for f in active if f.held or not len(f.slopes)])
+        if renew:
+            differentiate(problem, [f for f in active if not f.held], RENEWED)
         tried = [_steps(problem, f, dampings) for f in active]
-        columns = np.concatenate([column_of(f, z) for f, z in zip(active, tried, strict=True)])
-        found = problem.residuals(columns)
+        columns = [c for f, zs in zip(active, tried, strict=True) for c in column_of(f, zs)]
+        found = _simulate(problem, columns, _in_spare_lanes(active, len(columns)))
         for i, (fit, zs) in enumerate(zip(active, tried, strict=True)):
             part = slice(i * len(zs), (i + 1) * len(zs))
             costs = _costs(problem, fit, zs, found[part])
@@ -417,16 +470,16 @@ def _step(
     own, fresh = not fit.held, fit.fresh
     if better:
         step, change = z - fit.z, residual - fit.residual
-        fit.cost, fit.z, fit.residual, fit.fresh = cost, z, residual.copy(), False
+        fit.cost, fit.z, fit.residual = cost, z, residual.copy()
+        fit.ages += 1
+        if own:
+            _secant(problem, fit, step, change)
         if sufficient:
             fit.damping = 1.0
-            if own:
-                _secant(problem, fit, step, change)
-                if renew and fit.age >= RENEWED:
-                    fit.slopes = fit.slopes[:0]
             return
     if renew and own and not fresh:
-        fit.slopes, fit.damping = fit.slopes[:0], 1.0
+        fit.ages[fit.ages > 0] = RENEWED
+        fit.damping = 1.0
     elif better or fit.damping > 1.0:
         fit.done = True
     else:
@@ -441,4 +494,3 @@ def _secant(problem: Problem, fit: Fit, step: Array, change: Array) -> None:
     if length > 0.0:
         missing = change[: fit.slopes.shape[1]] - step @ fit.slopes
         fit.slopes = fit.slopes + np.outer(weights / length, missing)
-    fit.age += 1

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,7 @@ from pam_envs.arrays import Array
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.muscle.effective_area import MAP_SIZES, EffectiveAreaMuscle
 from pam_envs.muscle.effects import MAP_TERMS
 from pam_envs.parameters import declarations
 from pam_envs.plants.core.plant import UnstableParameters
@@ -27,8 +28,12 @@ LEAST_LINEAR = 0.02
 LEAST_STIFFNESS, LEAST_STIFFNESS_OF, LEAST_GAIN = 1.0, 50.0, 0.1
 """Least stiffness over strain, in parts of 50 N, and least slope of the force by pressure, over the
 area: a law below them is not monotone."""
-NOT_MONOTONE, REACH = 100.0, 1.1
-"""Weight of a unit of such a violation, and the checked range over the recorded one."""
+NOT_MONOTONE = 100.0
+"""Weight of a unit of such a violation."""
+LEVELS, MARGIN, REACH = (6, 10), 1.05, 1.1
+"""Levels of pressure and strain by which recorded states are grouped for these checks, range of the
+map over that of the groups, and range of the checks without pressure over the recorded one."""
+YIELD = "muscle.yield_force"
 SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.gain": {"scale": 0.01},
     "regulator.time_constant": {"log": True, "prior": 1.5},
@@ -51,6 +56,20 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
 }
 """Base parameters with the settings of their fits that differ from the declarations."""
+USUAL = {
+    "mass.moving_mass": (0.05, 5.0),
+    "mass.damping": (10.0, 1e4),
+    "muscle.strand_per_pressure": (-2e-6, 1e-4),
+    "muscle.yield_per_pressure": (-1e-3, 1e-3),
+    **dict.fromkeys((*(f"muscle.strand_{k}" for k in (1, 2, 3, 4)), YIELD), (0.0, 500.0)),
+    **dict.fromkeys((f"muscle.{name}" for name in MAP_SIZES), (-500.0, 500.0)),
+}
+"""Bounds of fits [SI], narrower than the declared ones, but widened by the start of a plant."""
+SHARE, FACTOR = 0.2, 20.0
+"""Ratios of the bounds of a fit to a start outside the usual bounds."""
+LEAST_SCALE = 0.01
+"""Least scale over the start, for forces of large muscles."""
+FORCES = ("muscle.braid_force", "muscle.stiffness", "muscle.softening", "muscle.hardening")
 ORIFICES = {
     "regulator.conductance": 3e-10,
     "regulator.exhaust_share": 1.0,
@@ -67,7 +86,7 @@ PILOT = {"regulator.pilot_lag": 0.02, "regulator.pilot_damping": 1.0}
 BASE = tuple(name for name in SETTINGS if name not in PILOT and name not in ORIFICES)
 CLOCK = "clock.offset"
 """Time [s] by which the readings lag the command: no parameter of the plant."""
-USUAL_ROWS = 2.0
+USUAL_ROWS = 2.5
 """Sampling periods within which the clocks of command and readings agree, if not declared."""
 PLAIN_NEUTRAL = {
     "regulator.dead_time": 0.0,
@@ -95,7 +114,8 @@ class MuscleFamily:
     plant: SingleMuscle
     inputs: Inputs
     clock: float = 0.0  # largest offset of the readings' clock [s]
-    longest: float = 0.0  # largest recorded contraction [m]; 0 if none was recorded
+    # recorded pressures [Pa] and strains at which the static law has to be monotone, (2, k)
+    states: Array = field(default_factory=lambda: np.zeros((2, 0)))
 
     channels = CHANNELS
     fallback_noise = (5e-5, 1e3)
@@ -147,19 +167,17 @@ class MuscleFamily:
     @property
     def checks(self) -> int:
         """Number of checks of the static law."""
-        return 2 * self._grid[0].size * self._grid[1].size if self.longest > 0.0 else 0
+        return 2 * self.states.shape[1]
 
     def violations(self, columns: Array) -> Array:
         """Return by how much static laws fail to be monotone, shape (n, checks).
 
-        The force has to fall with contraction and rise with pressure, over the recorded range.
+        The force has to fall with contraction and rise with pressure, near the recorded states.
         """
-        if self.longest <= 0.0:
-            return np.zeros((len(columns), 0))
-        w, e = (v[None] for v in np.meshgrid(*self._grid, indexing="ij"))
+        w, e = self.states[:, None]
 
         def value(name: str) -> Array:
-            return columns[:, R.place(name), None, None]  # type: ignore[no-any-return]
+            return columns[:, R.place(name), None]  # type: ignore[no-any-return]
 
         area, taper, curve = (value(f"muscle.area{part}") for part in ("", "_taper", "_curve"))
         braid = value("muscle.braid_strain")
@@ -175,30 +193,20 @@ class MuscleFamily:
         gain = gain + np.tensordot(sizes, gains, 1)
         lacks = np.maximum(0.0, LEAST_STIFFNESS - stiff / LEAST_STIFFNESS_OF)
         flat = np.maximum(0.0, LEAST_GAIN - gain / area)
-        apart = [NOT_MONOTONE * v.reshape(len(columns), -1) for v in (lacks, flat)]
-        return np.concatenate(apart, axis=1)
-
-    @cached_property
-    def _grid(self) -> tuple[Array, Array]:
-        """Pressures [Pa] and strains at which the static law is checked."""
-        full = self.plant.regulator.max_pressure
-        reach = REACH * self.longest / self.plant.muscle.rest_length
-        return np.linspace(0.0, full, 6), np.linspace(0.0, reach, 8)
+        return NOT_MONOTONE * np.concatenate([lacks, flat], axis=1)
 
     @cached_property
     def _map_slopes(self) -> tuple[Array, Array]:
-        """Derivatives of the map's terms by strain and pressure on the grid, (terms, 6, 8)."""
+        """Derivatives of the map's terms by strain and pressure at the states, (terms, k)."""
         law = self.plant.muscle
-        u = np.clip(2.0 * self._grid[0] / law.map_pressure - 1.0, -1.0, 1.0)
-        s = np.clip(2.0 * self._grid[1] / law.map_strain - 1.0, -1.0, 1.0)
+        u = np.clip(2.0 * self.states[0] / law.map_pressure - 1.0, -1.0, 1.0)
+        s = np.clip(2.0 * self.states[1] / law.map_strain - 1.0, -1.0, 1.0)
         eye = np.eye(6)
         of = [chebval(u, eye[p]) for p, _ in MAP_TERMS]
         by = [chebval(u, chebder(eye[p])) * 2.0 / law.map_pressure for p, _ in MAP_TERMS]
         of_e = [chebval(s, eye[q]) for _, q in MAP_TERMS]
         by_e = [chebval(s, chebder(eye[q])) * 2.0 / law.map_strain for _, q in MAP_TERMS]
-        slopes = np.array([np.outer(a, b) for a, b in zip(of, by_e, strict=True)])
-        gains = np.array([np.outer(a, b) for a, b in zip(by, of_e, strict=True)])
-        return slopes, gains
+        return np.array(of) * np.array(by_e), np.array(by) * np.array(of_e)
 
     def free(self, name: str, **changes: Any) -> Free:
         """Return the fit settings of a parameter; ``changes`` override its declaration."""
@@ -215,9 +223,17 @@ class MuscleFamily:
         d, value = declared(self.plant, name), self.plant.value(name)
         made = dict(low=d.low, high=d.high, start=value)
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
+        if name in USUAL:
+            low, high = USUAL[name]
+            least = SHARE * value if value > 0.0 else FACTOR * value
+            made["low"] = max(d.low, min(low, least))
+            made["high"] = min(d.high, max(high, FACTOR * value))
         if name == SOURCE:  # a muscle is filled from above its largest setpoint
             made["low"] = max(d.low, LEAST_SOURCE * self.plant.regulator.max_pressure)
-        return Free(name, R.place(name), **{**made, **SETTINGS.get(name, {}), **changes})
+        made |= SETTINGS.get(name, {})
+        if name in FORCES:
+            made["scale"] = max(made["scale"], LEAST_SCALE * abs(value))
+        return Free(name, R.place(name), **{**made, **changes})
 
     def base(self) -> tuple[Free, ...]:
         """Return the base parameters, with those of effects that the plant already has."""
@@ -236,6 +252,8 @@ class MuscleFamily:
     def plant_of(self, column: Array) -> SingleMuscle:
         """Return the plant with the parameters of a column."""
         values: dict[str, Any] = {n: float(column[R.place(n)]) for n in R.NAMES}
+        if not any(values[f"muscle.{name}"] for name in MAP_SIZES):
+            values |= UNUSED_MAP
         n = self.plant.elements
         if n:
             operator: Any = self.plant.hysteresis.operator
@@ -251,6 +269,10 @@ class MuscleFamily:
         raise unstable
 
 
+UNUSED_MAP = {
+    f"muscle.{name}": getattr(EffectiveAreaMuscle, name) for name in ("map_pressure", "map_strain")
+}
+"""Range of a map without terms."""
 FINER = (6, 8, 12, 20, 40, 70, 120)
 """Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
 
@@ -260,6 +282,45 @@ def unit_of(plant: SingleMuscle, name: str) -> str:
     if name == CLOCK:
         return "s"
     return "1" if name.startswith("hysteresis.weight") else declared(plant, name).unit
+
+
+def states_of(contraction: Array, pressure: Array, plant: SingleMuscle) -> Array:
+    """Return mean pressures [Pa] and strains of groups of recorded states, and beside, (2, k).
+
+    ``contraction`` [m] and ``pressure`` [Pa] have the shape (T,), NaN where there is no reading.
+    """
+    seen = np.isfinite(contraction) & np.isfinite(pressure)
+    if not seen.any():
+        return np.zeros((2, 0))
+    found = np.array([pressure[seen], contraction[seen] / plant.muscle.rest_length])
+    low, high = found.min(axis=1), found.max(axis=1)
+    spans = np.maximum(high - low, 1e-9)[:, None] / np.reshape(LEVELS, (2, 1))
+    levels = np.minimum((found - low[:, None]) // spans, np.reshape(LEVELS, (2, 1)) - 1.0)
+    _, group = np.unique(levels[0] * LEVELS[1] + levels[1], return_inverse=True)
+    counts = np.bincount(group)
+    middle = np.array([np.bincount(group, values) / counts for values in found])
+    steps = np.vstack([np.zeros(2), np.diag(spans[:, 0]), -np.diag(spans[:, 0])])
+    near = (middle[:, None] + steps.T[:, :, None]).reshape(2, -1)
+    near[0] = np.maximum(near[0], 0.0)
+    slack = np.linspace(0.0, REACH * high[1], LEVELS[1])  # where a start looks for its rest
+    return np.hstack([near, [np.zeros(LEVELS[1]), slack]])
+
+
+def spanning(plant: SingleMuscle, states: Array) -> SingleMuscle:
+    """Return a plant whose map, if it has none yet, spans recorded states (:func:`states_of`)."""
+    if plant.muscle.finer or not states.size:
+        return plant
+    law, values = (
+        declarations(plant.muscle),
+        {"pressure": states[0].max(), "strain": states[1].max()},
+    )
+    made = {
+        f"muscle.map_{name}": float(
+            np.clip(MARGIN * value, law[f"map_{name}"].low, law[f"map_{name}"].high)
+        )
+        for name, value in values.items()
+    }
+    return plant.replace(made)
 
 
 def start_plant(rig: Any) -> SingleMuscle:

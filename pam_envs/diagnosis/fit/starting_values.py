@@ -20,6 +20,7 @@ EARLIEST = 0.03  # share of a record at either end without candidates for a step
 SLOW = (30.0, 120.0)  # starting values of the duration of a slow drift [s]
 APART = 0.02  # least distance of two candidates, as a share of the record
 CANDIDATES = 2
+LEAST_PART = 0.02  # least factor on the amounts of a grid
 
 
 def step_starts(
@@ -84,7 +85,11 @@ def ramps(output: int) -> Callable[..., Starts]:
 
 @dataclass(frozen=True)
 class Grid:
-    """Search for the ``best`` points of a grid of the terms [SI], in one replay."""
+    """Search for the ``best`` points of a grid of the terms [SI], in one replay.
+
+    Where amounts are 0 without the effect, their sizes are those that fit best if the effect is in
+    proportion to them.
+    """
 
     values: tuple[Sequence[float], ...]
     best: int = 3
@@ -105,13 +110,21 @@ class Grid:
         places = [family.free(t.name, log=False).place for t in form.terms]
         columns = np.tile(column_of(base, base.z), (len(points), 1))
         columns[:, places] = points
-        found = problem.residuals(columns)[:, : problem.seen]
-        slopes = base.slopes[:, : problem.seen]
-        normal = np.einsum("im,jm->ij", slopes, slopes)
-        pulls = np.einsum("im,nm->in", slopes, found)
-        taken = np.einsum("in,in->n", pulls, np.linalg.pinv(normal, rcond=1e-9) @ pulls)
-        left = np.einsum("nm,nm->n", found, found) - taken
-        return [points[k] for k in np.argsort(left, kind="stable")[: self.best]]
+        residual, slopes = base.residual[: problem.seen], base.slopes[:, : problem.seen]
+        traces = problem.residuals(columns)[:, : problem.seen] - residual
+        inverse = np.linalg.pinv(slopes @ slopes.T, rcond=1e-9)
+        moved, pull = slopes @ traces.T, slopes @ residual
+        norms = np.sum(traces**2, axis=1) - np.sum(moved * (inverse @ moved), axis=0)
+        slope = traces @ residual - moved.T @ (inverse @ pull)
+        amounts = [t.amount for t in form.terms]
+        neutral = family.column[np.array(places)[amounts]]
+        sizes = np.ones(len(points))
+        if not neutral.any():
+            sizes = np.clip(-slope / np.maximum(norms, 1e-12), LEAST_PART, 1.0 / LEAST_PART)
+        left = (2.0 * slope + sizes * norms) * sizes
+        factors = np.where(amounts, sizes[:, None], 1.0)
+        starts = np.array(points) * factors
+        return [tuple(map(float, starts[k])) for k in np.argsort(left, kind="stable")[: self.best]]
 
 
 def grid(*values: Sequence[float], best: int = 3) -> Grid:

@@ -4,7 +4,7 @@ A load declared to 2 % may be off by 2 %: a fitted error within the tolerance is
 one that is significantly larger is an error of the payload.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,13 +22,15 @@ PAYLOAD_ERROR, IMITATES_PAYLOAD_ERROR = "payload_error", "load_dependent_complia
 UNWEIGHED = 0.5  # relative error of a load without a declared tolerance
 
 
-def unknown_names(tolerance: Iterable[str]) -> list[str]:
+def unknown_names(
+    tolerance: Iterable[str], names: Sequence[str] = R.NAMES, key: str = "tolerance"
+) -> list[str]:
     """Return a sentence for each name that is not a parameter of the plant."""
     none = ", which is not a parameter of the plant; docs/diagnosis_causes.md lists them"
     return [
-        f"RIG.yaml: tolerance names {name!r}{near(name, R.NAMES, none)}"
+        f"RIG.yaml: {key} names {name!r}{near(name, names, none)}"
         for name in tolerance
-        if name not in R.NAMES
+        if name not in names
     ]
 
 

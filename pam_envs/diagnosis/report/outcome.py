@@ -1,6 +1,6 @@
 """Outcome of a diagnosis, its time series, and the progress bar."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.arrays import Array
-from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 
 @contextmanager
@@ -46,6 +45,10 @@ class Traces:
     base: dict[str, Array]
     extended: dict[str, Array]
     effects: dict[str, dict[str, Array]]  # contributions of the named causes
+    # unit of each output, and the unit in SI
+    units: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    # label and values of the driving signal, if no output is it
+    drive: tuple[str, Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -56,8 +59,8 @@ class Diagnosis:
     text: str  # verdict in a few sentences
     causes: tuple[str, ...]  # names, in the order of evidence
     report: dict[str, Any]  # content of report.json (docs/diagnosis_report.md), rounded
-    base: SingleMuscle  # the refitted plant
-    plant: SingleMuscle  # the base extended by the causes; equal to it without a cause
+    base: Any  # the refitted plant
+    plant: Any  # the base extended by the causes; equal to it without a cause
     traces: Traces  # time series of the figures
     # private: the underlying fits (Study), which may change in any version
     study: Any = field(default=None, repr=False, compare=False)

@@ -98,12 +98,12 @@ def _numbers(report: Report) -> str:
     both = changed(report)
     heads = ["", "error before", "error after"] if both else ["", "error"]
     cells = [f'<div class="head">{head}</div>' for head in (*heads, "noise floor")]
-    for channel in ("contraction", "pressure"):
+    for channel in report.get("noise_floor") or report.get("error_before") or {}:
         keys = ("error_before", "error_after", "noise_floor")
         before, after, floor = (pp.at(report, key, channel) for key in keys)
         if not before and not floor:
             continue
-        cells.append(f'<div class="what">{channel}</div>')
+        cells.append(f'<div class="what">{escape(channel.replace("_", " "))}</div>')
         for kind, error in (("before", before), ("after", after))[: 1 + both]:
             times = pp.at(error, "times_floor")
             note = "" if times is None else f"{pp.number(times)} {TIMES} the noise floor"

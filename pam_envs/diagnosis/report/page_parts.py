@@ -196,19 +196,21 @@ def parameters(report: Report) -> str:
     ]
     heads: tuple[str, ...] = ("cause", "parameter", "value", "95 % interval", "neutral", "")
     body = table(heads, rows, (2, 3, 4), (1,), flags=5)
+    named = report.get("causes") or []
+    channels = dict.fromkeys(n for c in named for n in c.get("effect") or {})
     sizes = [
         (
             _title(c),
             c.get("form") or "",
             _gain(c.get("gain")),
-            quantity(at(c, "effect", "contraction")),
-            quantity(at(c, "effect", "pressure")),
+            *(quantity(at(c, "effect", channel)) for channel in channels),
             number(c.get("size")),
         )
-        for c in report.get("causes") or []
+        for c in named
     ]
-    heads = ("cause", "form", "gain", "on contraction", "on pressure", "over the noise")
-    body += table(heads, sizes, (2, 3, 4, 5))
+    shown = [f"on {channel.replace('_', ' ')}" for channel in channels]
+    heads = ("cause", "form", "gain", *shown, "over the noise")
+    body += table(heads, sizes, range(2, len(heads)))
     return f"<h3>Named causes</h3>\n{body or paragraph('No cause was named.')}"
 
 

@@ -1,8 +1,8 @@
 """Files of a diagnosis: ``report.json``, ``report.html`` and ``plant.yaml``.
 
 Every key of ``report.json`` is described in ``docs/diagnosis_report.md``. The same report gives the
-same bytes: numbers have six significant digits, values that are not finite are ``null``. Files are
-replaced atomically.
+same bytes: numbers have six significant digits, values that are not finite are ``null``. The folder
+is replaced atomically.
 """
 
 import json
@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.files import write_text
+from pam_envs.files import fresh_folder, write_text
 
+FILES = ("report.json", "report.html", "plant.yaml")
 SCHEMA = 1  # version of the layout of ``report.json``
 DIGITS = 6  # significant digits of a number in ``report.json``
 WIDTH = 100  # longest line for a list or an object
@@ -75,10 +76,10 @@ def report_json(report: Mapping[str, Any]) -> str:
 def write(diagnosis: Any, folder: Path) -> None:
     """Write a diagnosis into a folder, which is created if it is missing.
 
-    Everything is drawn before the first file is replaced, so that a folder contains one diagnosis,
-    never parts of two. A plant file or page of an earlier diagnosis is removed if this one has
-    none: settled readings give no plant. Without matplotlib ``report.json`` and ``plant.yaml`` are
-    written, the page is not, and ImportError is raised.
+    The files are written into a new folder that then takes its place, so that it contains one
+    diagnosis, never parts of two. A plant file or page of an earlier diagnosis is removed if this
+    one has none: settled readings give no plant. Other files stay. Without matplotlib
+    ``report.json`` and ``plant.yaml`` are written, the page is not, and ImportError is raised.
     """
     from pam_envs.diagnosis.report.page import page
 
@@ -88,15 +89,12 @@ def write(diagnosis: Any, folder: Path) -> None:
         html = page(json.loads(text), diagnosis.traces)
     except ImportError as error:
         missing = error
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, made in (("plant.yaml", diagnosis.plant), ("report.html", html)):
-        if made is None:
-            (folder / name).unlink(missing_ok=True)
-    if diagnosis.plant is not None:
-        diagnosis.plant.to_yaml(folder / "plant.yaml")
-    if html is not None:
-        write_text(folder / "report.html", html)
-    write_text(folder / "report.json", text)
+    with fresh_folder(folder, FILES) as fresh:
+        if diagnosis.plant is not None:
+            diagnosis.plant.to_yaml(fresh / "plant.yaml")
+        if html is not None:
+            write_text(fresh / "report.html", html)
+        write_text(fresh / "report.json", text)
     if missing is not None:
         raise ImportError(
             f"report.json is in {folder}; the page report.html needs matplotlib, which is not "

@@ -12,7 +12,14 @@ from pam_envs.diagnosis.decide.structure import binned_r2, flexible_r2, ljung_bo
 from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS
 from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.report.page_parts import enumeration
-from pam_envs.diagnosis.report.summary_causes import SCALE, UNITS, calibration, causes, rivals, seen
+from pam_envs.diagnosis.report.summary_causes import (
+    calibration,
+    causes,
+    rivals,
+    scale_of,
+    seen,
+    unit_of,
+)
 from pam_envs.wording import package
 
 
@@ -28,7 +35,7 @@ def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, An
         "causes": causes(study),
         "rivals": compared,
         "noise_floor": {
-            c: {"value": value / SCALE[c], "unit": UNITS[c], "from": source}
+            c: {"value": value / scale_of(study, c), "unit": unit_of(study, c), "from": source}
             for c, (value, source) in floors.items()
         },
         "held_out": {
@@ -82,8 +89,8 @@ def _explained(study: Any) -> dict[str, Any]:
         use = held.rows & np.isfinite(study.problem.measured[k])
         if not use.any():
             continue
-        scale = study.problem.noise[k] / SCALE[c]
-        floor = study.floor_of(c)[0] / SCALE[c]
+        scale = study.problem.noise[k] / scale_of(study, c)
+        floor = study.floor_of(c)[0] / scale_of(study, c)
         rows = [held.problem.rows(m.fit.residual)[k] for m in (held.base, held.model)]
         before, after = (float(np.sqrt(np.mean(row[use] ** 2))) * scale for row in rows)
         left = np.where(np.isfinite(study.problem.measured[k]), rows[1], np.nan)
@@ -95,7 +102,7 @@ def _explained(study: Any) -> dict[str, Any]:
             "after": after,
             "floor": floor,
             "black_box": after * lower,
-            "unit": UNITS[c],
+            "unit": unit_of(study, c),
             "share": min(1.0, (before**2 - max(after, floor) ** 2) / over) if over > 0.0 else None,
             "depends_on": [n for n, share in shares.items() if share > VARIES_WITH],
         }
@@ -122,11 +129,11 @@ def _errors(study: Any, candidate: Candidate) -> dict[str, Any]:
             continue
         counts = held.draws @ held.blocks.counts[k]
         spread = np.sqrt(held.draws @ candidate.errors[k] / np.maximum(counts, 1.0))
-        scale = study.problem.noise[k] / SCALE[c]
+        scale = study.problem.noise[k] / scale_of(study, c)
         value = float(np.sqrt(np.mean(rows[k][use] ** 2)))
         made[c] = {
             "value": value * scale,
-            "unit": UNITS[c],
+            "unit": unit_of(study, c),
             "interval": held.interval(spread * scale),
             "times_floor": value * study.problem.noise[k] / study.floor_of(c)[0],
             "kinds": {
@@ -156,9 +163,7 @@ def _structure(study: Any, candidate: Candidate) -> dict[str, Any]:
     made = {}
     for k, c in seen(study):
         residual = np.where(np.isfinite(study.problem.measured[k]), rows[k], np.nan)
-        frequency, ratio = spectral_peak(
-            residual, study.recording.period, study.regressors.values["pressure"]
-        )
+        frequency, ratio = spectral_peak(residual, study.recording.period, study.regressors.motion)
         values = study.regressors.values
         made[c] = {
             "ljung_box_p": ljung_box(residual),

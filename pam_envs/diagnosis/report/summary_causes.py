@@ -10,16 +10,23 @@ from pam_envs.diagnosis.decide.rule import Rule, not_excluded
 from pam_envs.diagnosis.decide.verdict import Decision, effect_traces
 from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.fit.intervals import spans
-from pam_envs.diagnosis.fit.single_muscle import declared, unit_of
 
 Json = dict[str, Any]
 
-UNITS = {"contraction": "mm", "pressure": "bar"}
-SCALE = {"contraction": 1e-3, "pressure": 1e5}
 BEST, OPEN, IMITATES = "the best", "not excluded", "imitates it"
 FEWER, MORE, SAME = "fewer causes", "more causes", "the same causes"
 LESS, WORSE, LITTLE = "gains less", "surely worse", "gains too little"
 EXCLUDED = (LESS, WORSE, LITTLE)  # reasons of excluded rivals
+
+
+def unit_of(study: Any, channel: str) -> str:
+    """Return the unit in which a channel is reported."""
+    return str(study.recording.channel(channel).unit)
+
+
+def scale_of(study: Any, channel: str) -> float:
+    """Return the unit in which a channel is reported, in SI."""
+    return float(study.recording.channel(channel).scale)
 
 
 def seen(study: Any) -> list[tuple[int, str]]:
@@ -54,8 +61,8 @@ def causes(study: Any) -> list[Json]:
                     {
                         "name": t.name,
                         "value": values[t.name],
-                        "unit": declared(family.plant, t.name).unit,
-                        "neutral": declared(family.plant, t.name).neutral,
+                        "unit": family.declared(t.name).unit,
+                        "neutral": family.declared(t.name).neutral,
                         **found[t.name],
                     }
                     for t in form.terms
@@ -63,8 +70,8 @@ def causes(study: Any) -> list[Json]:
                 "gain": held.gain(held.without.get(cause.name, held.base), held.model),
                 "effect": {
                     c: {
-                        "value": float(np.sqrt(np.mean(trace[k] ** 2))) / SCALE[c],
-                        "unit": UNITS[c],
+                        "value": float(np.sqrt(np.mean(trace[k] ** 2))) / scale_of(study, c),
+                        "unit": unit_of(study, c),
                     }
                     for k, c in seen(study)
                 },
@@ -84,7 +91,7 @@ def calibration(study: Any) -> list[Json]:
         if free.name in of_causes:
             continue
         value, before = after[free.name], float(column[free.place])
-        unit = unit_of(study.family.plant, free.name)
+        unit = study.family.declared(free.name).unit
         tolerance = study.sheet.tolerance.get(free.name)
         outside = tolerance is not None and abs(value - before) > tolerance * abs(before)
         made.append(

@@ -43,6 +43,7 @@ LOADS = (0.0, 2.55, 4.55)
 REFERENCE_RANGE = (0.001, 0.013)
 """Range of references [m]: within reach at every measured load."""
 HIGHEST_LOAD = 5.0
+"""Highest load [kg] of the shipped muscle; that of another plant is the one that it declares."""
 RANDOMIZATION = Randomization(
     R.NAMES,
     ("mass.load", "regulator.max_pressure", "muscle.diameter", "muscle.braid_angle"),
@@ -76,7 +77,8 @@ def make_setup(
         Random pressure history, or never inflated.
     """
     made = given.plant_of(SingleMuscle, default_plant)
-    loads = masses_of("load", load, HIGHEST_LOAD, LOADS)
+    most = max(HIGHEST_LOAD, made.mass.load)
+    loads = masses_of("load", load, most, LOADS)
     family, samples = given.reference_of(FAMILIES, "m", 0.2)
     check_choice("start", start, ("random", "rest"))
     task, full = given.task_of(Tracking), made.regulator.max_pressure
@@ -85,7 +87,7 @@ def make_setup(
         "reference_low": REFERENCE_RANGE[0],
         "reference_high": REFERENCE_RANGE[1],
         "start_share": 0.9 if start == "random" else 0.0,
-        "load_change": check_number("load_disturbance", load_disturbance, 0.0, HIGHEST_LOAD, "kg"),
+        "load_change": check_number("load_disturbance", load_disturbance, 0.0, most, "kg"),
     }
     position = ("m", task.lowest_contraction, task.highest_contraction)
     pressure = ("Pa", 0.0, full)
@@ -98,7 +100,7 @@ def make_setup(
             ("contraction", *position),
             ("pressure", *pressure),
             ("set_point", *pressure),
-            ("load", "kg", 0.0, HIGHEST_LOAD),
+            ("load", "kg", 0.0, most),
         ],
         references=[("reference", *position)],
         action=[("pressure_set_point", *pressure)],

@@ -13,7 +13,12 @@ from pam_envs.arrays import Array
 from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.pair import advance, feed_forward
-from pam_envs.plants.antagonistic_joint.step import N_WORK, begin_lane, replacements
+from pam_envs.plants.antagonistic_joint.step import (
+    N_WORK,
+    begin_filled,
+    begin_lane,
+    replacements,
+)
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.core.rollout import (
     BEGIN,
@@ -39,7 +44,9 @@ OUTPUTS = signal_rows(
 """Every signal of a record (SI) and its row of state."""
 MAKE = ("hysteresis.kind", "dynamics", "substeps")
 COMMANDED, STRESSED, DISTURBED, LOADED, FILLED_A, FILLED_B, DIRECT = range(7)
-"""Input channels of a record; ``DIRECT`` above 0 means that pressures are given."""
+"""Input channels of a record; ``DIRECT`` above 0 means that pressures are given, ``FROM_THEM`` that
+the joint also begins at rest at them."""
+FROM_THEM = 2.0
 
 
 @kernel
@@ -64,7 +71,10 @@ def begin(
     for j in range(LANES):
         start_hysteresis(rows, counts, K.END, j)
         angle, stress = rows[K.COMMAND][j], rows[K.PRESTRESS][j]
-        begin_lane(rows, fixed, counts, table, K.END, elements, j, angle, stress)
+        if drives[DIRECT][t][min(first + j, len(drives[0][0]) - 1)] == FROM_THEM:
+            begin_filled(rows, fixed, counts, table, K.END, elements, j)
+        else:
+            begin_lane(rows, fixed, counts, table, K.END, elements, j, angle, stress)
 
 
 @kernel
@@ -79,6 +89,7 @@ def come_to_rest(
 
 def channels_of(plant: AntagonisticJoint) -> dict[str, float]:
     """Return the inputs of the joint, with defaults; ``direct`` above 0: pressures are given."""
+    # direct = 2: the joint also begins at rest at the given pressures
     names = ("command", "prestress", "disturbance", "payload", "pressure_a", "pressure_b", "direct")
     return dict.fromkeys(names, 0.0) | {"prestress": plant.prestress}
 

@@ -140,6 +140,14 @@ def begin_lane(
     cleared hysteresis (:func:`start_hysteresis`) are set before.
     """
     command(rows, fixed, j, angle, prestress, K.COMMAND, K.PRESTRESS, K.SET_POINT_A)
+    begin_filled(rows, fixed, counts, table, hysteresis, elements, j)
+
+
+@routine
+def begin_filled(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
+) -> None:
+    """Bring one lane to rest at its setpoints [Pa], as :func:`begin_lane`."""
     rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j] = (
         rows[K.SET_POINT_A][j],
         rows[K.SET_POINT_A + 1][j],

@@ -33,6 +33,7 @@ from pam_envs.muscle.effective_area import law_and_slope, tension, tension_slope
 from pam_envs.muscle.effects import (
     map_force,
     map_on,
+    map_slopes,
     slip_strands,
     stiffening,
     strand_forces,
@@ -44,7 +45,10 @@ from pam_envs.muscle.effects import (
 )
 from pam_envs.plants.core.sensors import begin_with_effects, effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
+from pam_envs.plants.single_muscle.hysteresis_kernels import (
+    friction_per_load,
+    hysteresis_kernels,
+)
 from pam_envs.plants.single_muscle.rows import STATE as S
 from pam_envs.pneumatics.enclosed_air import (
     AHEAD,
@@ -138,7 +142,10 @@ def effective_pressure(
         )
         drive[j] = true[j] - (1.0 + fixed[R.HYSTERESIS_FIRST_WIDTH][j] * new) * friction[j]
     for j in range(first, last if yields > 0 else first):
-        drive[j] = drive[j] - fixed[R.HYSTERESIS_YIELD_WIDTH][j] * rows[EFFECTS_AT + S.yielding][j]
+        width = fixed[R.HYSTERESIS_YIELD_WIDTH][j] * friction_per_load(
+            fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j]
+        )
+        drive[j] = drive[j] - width * rows[EFFECTS_AT + S.yielding][j]
     if creeps > 0:
         for j in range(first, last):
             most[j] = 0.0
@@ -239,8 +246,7 @@ def law_of(
 def pull_at_rest(fixed: Any, j: int, drive: float, e: float, stiffer: float) -> float:
     """Return the force [N] of the static law and its map at an effective pressure [Pa]."""
     pull, _ = law_of(fixed, j, drive, drive, e, stiffer)
-    more, _, _ = map_force(fixed, j, R.MUSCLE_MAP_05, drive, e)
-    return pull + more
+    return pull + map_force(fixed, j, R.MUSCLE_MAP_05, drive, e)
 
 
 @routine
@@ -416,8 +422,8 @@ def mapped_pull(
     _, _, _, shift = carried(fixed, j, rows[R.LOAD][j])
     e = x / fixed[R.MUSCLE_REST_LENGTH][j]
     middle = 0.5 * (was + rows[R.DRIVE][j]) - shift
-    more, _, _ = map_force(fixed, j, R.MUSCLE_MAP_05, was - shift, e)
-    _, steeper, wider = map_force(fixed, j, R.MUSCLE_MAP_05, middle, e)
+    more = map_force(fixed, j, R.MUSCLE_MAP_05, was - shift, e)
+    steeper, wider = map_slopes(fixed, j, R.MUSCLE_MAP_05, middle, e)
     return pull + more, slope + steeper, mass, hung, eased, loss, area + wider
 
 
@@ -450,6 +456,11 @@ def forces(
             rows, fixed, EFFECTS_AT + S.deflection, R.MUSCLE_YIELD_FORCE, strain, rows[R.DRIVE],
             friction, sticking,
         )  # fmt: skip
+    if strands + deflects > 0:
+        for j in range(LANES):
+            wide = friction_per_load(fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j])
+            friction[j] = friction[j] * wide
+            sticking[j] = sticking[j] * wide
     if maps > 0:
         for j in range(LANES):
             found = mapped_pull(rows, fixed, j, was[j], x[j] + 0.5 * h * v[j])

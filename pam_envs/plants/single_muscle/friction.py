@@ -21,7 +21,7 @@ from pam_envs.hysteresis.protocol import HysteresisModel
 from pam_envs.hysteresis.slip import SlipModel, slip_lag
 from pam_envs.kernels.build import entry, kernel
 from pam_envs.muscle.effective_area import EffectiveAreaMuscle, law_and_slope
-from pam_envs.muscle.effects import MAP, map_force
+from pam_envs.muscle.effects import MAP, map_force, map_slopes
 
 if TYPE_CHECKING:
     from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -54,8 +54,8 @@ def strain_of_rest(
             drive, drive, e, stiffer, law[0, 0], law[1, 0], law[2, 0], law[3, 0], law[4, 0],
             law[5, 0], law[6, 0], law[7, 0], law[8, 0],
         )  # fmt: skip
-        more, steeper, _ = map_force(law, 0, 9, drive, e)
-        force, slope = force + more, slope + steeper
+        steeper, _ = map_slopes(law, 0, 9, drive, e)
+        force, slope = force + map_force(law, 0, 9, drive, e), slope + steeper
         lag, stick = slip_lag(e, limit, thresholds, curves, low, per, sliders)
         excess = force - friction * lag - pull
         if excess > 0.0:

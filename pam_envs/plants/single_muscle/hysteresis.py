@@ -37,8 +37,9 @@ class Hysteresis(
     pressure and length do.
 
     *Pressure*: the pressure, stretched to a scale on which friction is uniform, passes an operator
-    with hysteresis; the operator's hysteretic part is scaled by ``1 + width_per_load * load``; the
-    result is stretched back. ``operator`` has slope 1 and starts virgin, or is None.
+    with hysteresis; the operator's hysteretic part is scaled by ``1 + width_per_load * load``, like
+    friction of strands and friction that yields; the result is stretched back. ``operator`` has
+    slope 1 and starts virgin, or is None.
     """
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (

@@ -38,6 +38,12 @@ def loop_width(width_per_load: float, load: float) -> float:
 
 
 @kernel
+def friction_per_load(width_per_load: float, load: float) -> float:
+    """Return the factor on friction beside the operator at this load: none limits its growth."""
+    return max(0.0, 1.0 + width_per_load * load)
+
+
+@kernel
 def pressure_itself(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
     elements: int, work: Any,

@@ -11,7 +11,7 @@ from tests.benchmarks.row_helpers import draw, place, run_row
 PAGE = "leaderboard/MusclePositioning.md"
 
 
-def test_board_shows_round_missing_entrants_and_outsiders(tmp_path):
+def test_board_shows_round_missing_entrants_and_outsiders(tmp_path, monkeypatch):
     with place(tmp_path):
         run_row(tmp_path, "middle")
         draw(tmp_path, "trained", "low", "integral")
@@ -19,6 +19,7 @@ def test_board_shows_round_missing_entrants_and_outsiders(tmp_path):
         run_row(tmp_path, "low")
         held = read_json(path)
         verified.note(path, held[CHECKSUM], verified.BITS)
+        monkeypatch.setattr(verified, "committed", verified.read)
         loaded = leaderboard.load(tmp_path / "out")
         (tracks,) = standings.tracks(loaded).values()
         found = standings.listing(tracks)

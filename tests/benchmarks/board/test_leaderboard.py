@@ -2,6 +2,7 @@
 
 import json
 import re
+import subprocess
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import board_fakes as fakes
 import pytest
 
+from benchmarks.__main__ import main
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, format, leaderboard, plots, standings, summary
 from benchmarks.board.format import duration, number, table
@@ -17,6 +19,7 @@ from benchmarks.runs import rows
 from benchmarks.scoring.group import Column
 from benchmarks.scoring.metrics import GROUPS, columns_of, of_track
 
+AUTHOR = ("-c", "user.name=test", "-c", "user.email=test@example.org")
 BOARD, PAGE = leaderboard.BOARD.name, "leaderboard/MusclePositioning.md"
 
 
@@ -205,8 +208,40 @@ def test_verification_counts_only_for_the_row_with_its_checksum(monkeypatch, tmp
     entry = {"checksum": "e" * 64, "date": "2026-01-03", "mode": "bits"}
     held = {given[0]["row"]: entry, given[1]["row"]: {**entry, "checksum": "an older row"}}
     (tmp_path / "verified.json").write_text(json.dumps(held))
-    words = [views.verified_words(row) for row in leaderboard.load(tmp_path)]
-    assert words == ["verified 2026-01-03", "not verified yet"]
+
+    def words() -> list[str]:
+        return [views.verified_words(row) for row in leaderboard.load(tmp_path)]
+
+    assert words() == ["not verified yet"] * 2  # in another folder than this checkout's
+    monkeypatch.setattr(rows, "RESULTS", tmp_path)
+    assert words() == ["not verified yet"] * 2  # not committed
+    for command in (["init", "-q"], ["add", "."], [*AUTHOR, "commit", "-qm", "verified"]):
+        subprocess.run(["git", "-C", str(tmp_path), *command], check=True)
+    assert words() == ["verified 2026-01-03", "not verified yet"]
+    held[given[1]["row"]] = entry
+    (tmp_path / "verified.json").write_text(json.dumps(held))
+    assert words() == ["verified 2026-01-03", "not verified yet"]
+
+
+def test_text_of_a_row_is_no_html(monkeypatch):
+    row = fakes.row("pid", 1e-3)
+    evil = '<img src=x onerror="alert(1)">'
+    row["volatile"]["machine"] = row["controller"]["author"] = row["controller"]["summary"] = evil
+    row["controller"]["tuning"]["how"] = row["scenarios"]["content"]["title"] = evil
+    texts = leaderboard.files([row])
+    assert "&lt;img src=x" in texts["leaderboard/times.md"]
+    assert not any("<img src=x" in text for name, text in texts.items() if name.endswith(".md"))
+
+
+def test_board_of_another_folder_writes_nothing_outside_of_it(tmp_path, monkeypatch):
+    (tmp_path / "rows").mkdir()
+    monkeypatch.setattr(leaderboard, "BOARD", tmp_path / "own" / "LEADERBOARD.md")
+    for command in ("board", "site"):
+        assert main([command, "--results", str(tmp_path / "rows")]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["rows"]
+    assert {path.name for path in (tmp_path / "rows").iterdir()} == {
+        *("LEADERBOARD.md", "leaderboard", "site")
+    }
 
 
 def test_board_without_rows_has_a_message(tmp_path):

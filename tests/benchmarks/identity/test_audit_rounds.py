@@ -1,7 +1,9 @@
 """Audit rounds: one salt per track, drawn after all artefacts; no gain from selecting variants."""
 
+import dataclasses
 import hashlib
 import json
+import subprocess
 from pathlib import Path
 
 import bench_fakes
@@ -39,6 +41,28 @@ def a_round(**changes: object) -> audit.Round:
         "commit": "c" * 40,
     }
     return audit.Round(**{**given, **changes})
+
+
+def test_changed_round_is_found_even_if_it_is_committed(tmp_path, monkeypatch):
+    file = tmp_path / "rounds.json"
+    monkeypatch.setattr(audit, "FILE", file)
+
+    def commit(*rounds: audit.Round) -> None:
+        file.write_text(json.dumps({"rounds": [dataclasses.asdict(entry) for entry in rounds]}))
+        author = ("-c", "user.name=test", "-c", "user.email=test@example.org")
+        for command in (["init", "-q"], ["add", "."], [*author, "commit", "-qm", "rounds"]):
+            subprocess.run(["git", "-C", str(tmp_path), *command], check=True)
+
+    first, second = a_round(), a_round(number=2, salt="later")
+    commit(first)
+    commit(first, second)
+    assert audit.altered() == []
+    for wrong in (a_round(salt="chosen"), a_round(frozen="other"), a_round(drawn="2026-01-02")):
+        commit(wrong, second)
+        (said,) = audit.altered()
+        assert said.startswith("round 1 of tiny is not that of commit ")
+    commit(first)
+    assert any(said.startswith("round 2 of tiny") for said in audit.altered())
 
 
 def test_seeds_follow_from_frozen_identity_salt_scenario_and_number():

@@ -24,6 +24,10 @@ def test_every_row_is_in_its_round_and_verified():
     assert [row["row"] for row in found if not verified.of(row, noted)] == []
 
 
+def test_no_round_of_an_earlier_commit_has_changed():
+    assert audit.altered() == []
+
+
 @pytest.mark.parametrize("track", CHEAP)
 def test_no_row_is_void(track):
     found = [rows.load(rows.path_of(rows.row_name(track, name))) for name in CHEAP[track]]

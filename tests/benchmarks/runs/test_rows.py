@@ -17,6 +17,7 @@ from benchmarks.runs.cells import cells_of
 from benchmarks.runs.controllers import BY_RULE, available, find
 from benchmarks.runs.store import write_record
 from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import statistics
 from tests.benchmarks.row_helpers import place, run_row, tiny
 
@@ -114,6 +115,7 @@ def of_version(row: dict[str, Any], number: int) -> dict[str, Any]:
     """Return a row as if it were of another version of its environment."""
     text = json.dumps(row).replace("Positioning-v0", f"Positioning-v{number}")
     row = json.loads(text)
+    row["scenarios"]["digest"] = ScenarioSet(row["scenarios"]["content"]).digest
     return {**row, "row": f"tiny--v{number}", "controller": {**row["controller"], "name": "v1"}}
 
 
@@ -155,15 +157,28 @@ def put(outer: str, key: str, value: object) -> Callable[[dict[str, Any]], None]
     return change
 
 
-DISAGREE = "have to agree, in letters, digits and _"
+DISAGREE = "have to agree: run it again"
 REFUSED: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "path in the row's name": (put("", "row", "../../../escaped"), DISAGREE),
-    "path in the controller's name": (put("controller", "name", "integral/.."), DISAGREE),
+    "path in the controller's name": (
+        put("controller", "name", "integral/.."),
+        "controller.name must match",
+    ),
+    "another metric": (lambda row: row["episodes"][0]["scores"].update(best=0.0), "other metrics"),
+    "another entry": (put("", "comment", "x"), "it must not contain .'comment'. properties"),
+    "long text": (put("volatile", "host", "x" * 501), "volatile.host must be shorter"),
+    "control characters": (put("volatile", "machine", "\x1b[31m"), "volatile.machine must match"),
+    "other commit": (put("made_with", "commit", "my own"), "made_with.commit must match"),
+    "other scenario": (lambda row: row["episodes"][0].update(scenario="easy"), "another scenario"),
+    "huge number": (lambda row: row["episodes"][0].update(saturated=1e300), "must be smaller"),
     "another file": (put("", "row", "tiny--inverse"), f"holds 'tiny--inverse'.*{DISAGREE}"),
     "former schema": (put("", "schema", 1), "schema 4, but of 1; run it again: .*--track tiny"),
-    "no episodes": (put("", "episodes", None), "a row without episodes; run it again"),
-    "no version": (put("env", "version", None), r"a row without env\.version; run it again"),
-    "no mapping": (put("", "controller", "inverse"), r"without controller\.name, "),
+    "no episodes": (
+        put("", "episodes", None),
+        r"not a row: it must contain \['episodes'\] properties; run it",
+    ),
+    "no version": (put("env", "version", None), r"not a row: env must contain \['version'\]"),
+    "no mapping": (put("", "controller", "inverse"), "not a row: controller must be object"),
 }
 
 

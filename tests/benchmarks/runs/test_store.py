@@ -48,6 +48,28 @@ def test_episodes_with_different_keys_are_kept(episodes, tmp_path):
     assert store.read_record(path)["episodes"] == episodes
 
 
+HOSTILE = {
+    "deep": b"[" * 40_000,
+    "twice": b'{"row": 1, "episodes": [], "row": 2}',
+    "not a number": b'{"row": NaN}',
+    "digits": b"[" + b"9" * 5000 + b"]",
+    "bomb": b" " * (store.MOST + 1),
+    "bytes": b"\xff\xfe",
+    "columns of text": b'{"episodes": {"scores": "abc"}}',
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+@pytest.mark.parametrize("suffix", [".json", ".json.xz"])
+def test_hostile_file_is_one_sentence_with_its_name(what, suffix, tmp_path):
+    path = tmp_path / f"a{suffix}"
+    content = HOSTILE[what]
+    path.write_bytes(lzma.compress(content) if suffix.endswith("xz") else content)
+    with pytest.raises(ValueError, match=r"a\.json(\.xz)?: (not JSON|no checksum)") as error:
+        store.read_record(path)
+    assert len(str(error.value)) < 400 + len(str(path))
+
+
 @pytest.mark.parametrize("damage", ["cut", "text", "list", "columns", "no scores"])
 def test_damaged_file_is_refused(damage, tmp_path):
     path = tmp_path / "a.json.xz"

@@ -15,6 +15,7 @@ from benchmarks.__main__ import main
 from benchmarks.identity import audit
 from benchmarks.runs import provenance, rows, traces, verified, verify
 from benchmarks.runs.store import read_json, read_record, write_json, write_record
+from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import metrics
 from pam_envs.envs.positioning import env as muscle_positioning
 from tests.benchmarks.row_helpers import draw, place, run_row
@@ -100,6 +101,10 @@ def put(path: str, value: Any) -> Change:
 def without_audit(row: Row) -> None:
     row["audit"] = None
     row["episodes"] = rows.episodes_of(row)
+
+
+def renew_digest(row: Row) -> None:
+    row["scenarios"]["digest"] = ScenarioSet(row["scenarios"]["content"]).digest
 
 
 def a_hair_less(value: float) -> float:
@@ -221,7 +226,11 @@ def test_changed_environment_voids_rows(board, monkeypatch):
 
 
 def test_scenarios_of_another_version_are_not_run(forged):
-    (line,) = forged("integral", put("scenarios.content.settle_seconds", 0.25)).drifted
+    def change(row: Row) -> None:
+        put("scenarios.content.settle_seconds", 0.25)(row)
+        renew_digest(row)
+
+    (line,) = forged("integral", change).drifted
     assert "scenarios: the content is not that of tiny.yaml, version 1" in line
 
 
@@ -229,6 +238,7 @@ def test_row_of_another_environment_version_is_refused(forged):
     def change(row: Row) -> None:
         text = json.dumps(row).replace("Positioning-v0", "Positioning-v1")
         row.update(json.loads(text.replace('"version": 0', '"version": 1')))
+        renew_digest(row)
 
     words = "MusclePositioning-v1, and this checkout has PAM/MusclePositioning-v0"
     assert_drifted(forged("integral", change), words)
@@ -236,9 +246,9 @@ def test_row_of_another_environment_version_is_refused(forged):
 
 def test_missing_entries_are_named(forged):
     verdict = forged("integral", lambda row: row.pop("env"), loads=False)
-    assert_drifted(verdict, "a row without env, env.id, env.version")
-    verdict = forged("integral", lambda row: row["episodes"][0].pop("split"))
-    assert_drifted(verdict, "cannot be run again: there is no 'split'")
+    assert_drifted(verdict, "not a row: it must contain ['env'] properties")
+    verdict = forged("integral", lambda row: row["episodes"][0].pop("split"), loads=False)
+    assert_drifted(verdict, "not a row: episodes[0] must contain ['split'] properties")
 
 
 def test_audit_without_a_round_is_detected(board, monkeypatch):
@@ -251,7 +261,7 @@ def test_damaged_file_is_detected(board, tmp_path):
     path = rows.path_of("tiny--integral", tmp_path)
     path.parent.mkdir()
     row = read_json(path_of(board, "integral"))
-    row["training_seeds"] = [1]
+    row["task"] = ZEROS
     write_json(path, row)
     assert_drifted(verify.verify(path), "file: the checksum does not match")
     path.write_text("no row")
@@ -344,8 +354,12 @@ def test_inapplicable_metric_is_not_drift(board, elsewhere, monkeypatch):
     assert verify.verify(path).holds
 
 
-def test_commands_print_and_record_outcomes(board, forged, capsys):
+def test_commands_print_and_record_outcomes(board, forged, capsys, monkeypatch):
     honest, other = (str(path_of(board, name)) for name in ("integral", "raises"))
+    assert main(["verify", honest, "--jobs", "1"]) == 0
+    assert not verified.read(board / "out")  # rows of another folder than this checkout's
+    capsys.readouterr()
+    monkeypatch.setattr(rows, "RESULTS", board / "out")
     assert main(["verify", honest, other, "--jobs", "1"]) == 0
     assert "tiny--integral: reproduced\n" in capsys.readouterr().out
     found = verified.read(board / "out")
@@ -366,6 +380,15 @@ def test_commands_print_and_record_outcomes(board, forged, capsys):
     for command in ("verify", "void", "cite"):
         assert main([command, "tiny--nobody"]) == 2
         assert "there is no row 'tiny--nobody'" in capsys.readouterr().err
+
+
+def test_name_with_a_path_is_no_row(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x").write_text("no row")
+    for name in ("../../x", "x", "a/../b--c", "/etc/passwd", "tiny--a--b", ""):
+        assert main(["verify", name]) == 2
+        assert "is neither a file TRACK/CONTROLLER.json.xz nor a name" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["x"]
 
 
 def test_bit_exact_verification_is_kept_after_a_tolerant_one(tmp_path):

@@ -387,7 +387,8 @@ NEEDY = [
 
 @pytest.mark.parametrize(("word", "poor", "rig", "reason"), NEEDY)
 def test_requirements_of_a_users_cause_are_checked(word, poor, rig, reason):
-    assert {row[0] for row in NEEDY} == set(NEEDS)
+    always = {"command"}  # in every recording of a single muscle
+    assert {row[0] for row in NEEDY} == set(NEEDS) - always
     cause = Cause("gremlins", "gremlins", (), needs=(word,))
     assert undecidable(SOUND, unrested(5), [cause]) == {}
     found = undecidable(poor, rig, [cause, Cause("modest", "a modest one", ())])

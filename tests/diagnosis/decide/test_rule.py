@@ -17,9 +17,11 @@ from pam_envs.diagnosis.fit.least_squares import Fit, Problem
 RULE = Rule()
 
 
-def left(excess: float = 1.0, r2: float = 0.0, peak: float = 4.0) -> dict[str, Any]:
+def left(
+    excess: float = 1.0, r2: float = 0.0, peak: float = 4.0, hertz: float = 5.0
+) -> dict[str, Any]:
     found = {"excess": excess, "by_channel": [excess, 0.0], "r2": [r2, 0.0]}
-    return found | {"peak": peak, "rest": 0.0}
+    return found | {"peak": peak, "peaks": [(hertz, peak), (9.0, 3.0)], "rest": 0.0}
 
 
 def rival(*names: str, gain: float, better: float = 0.0, **marks: bool) -> dict[str, Any]:
@@ -91,17 +93,18 @@ def test_a_cause_like_another_law_needs_more_on_a_rig_with_another_law(gain, law
 
 
 @pytest.mark.parametrize(
-    ("peak", "excess", "verdict"),
+    ("was", "peak", "hertz", "excess", "verdict"),
     [
-        (120.0, 4.0, "unexplained"),  # the oscillation is still there
-        (50.0, 4.0, "named"),  # most of it has gone
-        (120.0, 1.5, "named"),  # little besides
+        (120.0, 120.0, 5.2, 4.0, "unexplained"),  # the oscillation is still there
+        (120.0, 120.0, 3.0, 4.0, "named"),  # another one, of what is left
+        (20.0, 60.0, 5.2, 4.0, "named"),  # it was hidden before: not what was to be explained
+        (120.0, 50.0, 5.2, 4.0, "named"),  # most of it has gone
+        (120.0, 120.0, 5.2, 1.5, "named"),  # little besides
     ],
 )
-def test_an_oscillation_that_lasts_is_unexplained(peak, excess, verdict):
-    found = evidence(
-        level(1.0, LEAK, left=left(excess=excess, peak=peak)), before=left(excess=10.0, peak=120.0)
-    )
+def test_an_oscillation_that_lasts_is_unexplained(was, peak, hertz, excess, verdict):
+    after = left(excess=excess, peak=peak, hertz=hertz)
+    found = evidence(level(1.0, LEAK, left=after), before=left(excess=10.0, peak=was))
     assert judge(found, RULE).verdict == verdict
 
 

@@ -47,7 +47,7 @@ def force(family: MuscleFamily, found: dict[str, float], pressure: Array, strain
     law = family.plant.muscle
     area = found["muscle.area"]
     taper = found["muscle.area_taper"] * strain + found["muscle.area_curve"] * strain**2
-    passive = found["muscle.braid_force"] * -np.expm1(-strain / law.braid_strain)
+    passive = found["muscle.braid_force"] * -np.expm1(-strain / found["muscle.braid_strain"])
     names = ("stiffness", "softening", "hardening", "stiffening")
     passive += sum(found[f"muscle.{name}"] * strain ** (k + 1) for k, name in enumerate(names))
     terms = np.zeros((6, 6))

@@ -195,7 +195,7 @@ MUSCLE = "schema: 1\nfamily: single_muscle\n"
         (MUSCLE + "parameters: {mass.weight: 1}", "unknown parameter"),
         (MUSCLE + "parameters: {mass.load: heavy}", "must be a number"),
         (MUSCLE + "parameters: {mass.load: .nan}", "outside its bounds"),
-        (MUSCLE + "parameters: {mass.load: 99}", r"mass.load = 99 kg"),
+        (MUSCLE + "parameters: {mass.load: 999}", r"mass.load = 999 kg"),
         (MUSCLE + "parameters: {mass.load: {value: 1, unit: g}}", "expected 'kg'"),
         (MUSCLE + "parameters: {mass.load: {value: 1, why: x}}", "unknown key 'why'"),
         (MUSCLE + "parameters: {mass.load: {value: 1, provenance: rumour}}", "provenance 'rumour'"),

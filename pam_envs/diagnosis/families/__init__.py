@@ -1,0 +1,1 @@
+"""Plants that can be diagnosed, a module for each kind."""

@@ -1,0 +1,258 @@
+"""Base of plants that are replayed by their compiled loops, with parameter columns."""
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.arrays import Array
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis.audit.audit import MANY_CYCLES, SHUT_SECONDS, longest_shut
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.calibrate import Calibration
+from pam_envs.diagnosis.fit.candidate import fit_base
+from pam_envs.diagnosis.fit.least_squares import (
+    FEW_DAMPINGS,
+    Fit,
+    Free,
+    Problem,
+    column_of,
+    evaluate,
+    improve,
+)
+from pam_envs.hysteresis.protocol import ELEMENTS
+from pam_envs.parameters import Declaration, declarations
+from pam_envs.plants.core.plant import Plant, UnstableParameters
+from pam_envs.plants.core.rollout import BEGIN, run
+
+TILE = 16
+"""Plants that a tile advances together."""
+FINER = (6, 8, 12, 20, 40, 70, 100)
+"""Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
+WEIGHT = "hysteresis.weight["
+WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
+ROUNDS, VALVE_ROUNDS = 25, 12
+INSTANT = {"dead_time": 0.0, "slew_rate": 1e9, "gain": 1.0}
+"""Parameters of a regulator whose pressures are the measured ones."""
+LEAST_LAG = 2e-3
+"""Least time constant of a regulator [s]."""
+
+
+@dataclass(frozen=True)
+class CompiledFamily:
+    """Plant with the inputs of a recording, replayed by its compiled loop.
+
+    Attributes
+    ----------
+    plant : Plant
+    period : float
+        Sampling period [s].
+    drives : ndarray, shape (channels, T, 1)
+        Inputs [SI] in the order of the family's loop.
+    fresh : ndarray of bool, shape (T,)
+        Samples at which the plant restarts from rest.
+    regulator : object or None
+        The regulator of the given plant where, for lack of commands, the measured pressures are
+        the inputs, and follow at once.
+    """
+
+    plant: Any
+    period: float
+    drives: Array
+    fresh: NDArray[np.bool_]
+    regulator: Any = None
+
+    channels: ClassVar[tuple[str, ...]]
+    settings: ClassVar[Mapping[str, Mapping[str, Any]]]
+    longest_step: ClassVar[float] = 0.0051
+
+    @property
+    def measured_drive(self) -> bool:
+        """Whether the measured pressures are the inputs."""
+        return self.regulator is not None
+
+    @property
+    def column(self) -> Array:
+        """Parameters of the plant, shape (p,)."""
+        return np.asarray(self.plant.parameter_rows())
+
+    @property
+    def loop(self) -> Any:
+        """Loop whose outputs are the channels."""
+        return self.plant.module("rollout").loop_of(self.plant, True, readings=True)
+
+    def simulate(self, columns: Array) -> Array:
+        """Return sensor readings for parameter columns (n, p), shape (channels, T, n)."""
+        substeps = max(1, int(np.ceil(self.period / self.longest_step)))
+        flags = np.where(self.fresh, BEGIN, 0).astype(np.int64)
+        made = run(
+            self.loop, self.plant, columns, self.drives, flags=flags, substeps=substeps,
+            period=self.period, before=True, lanes=TILE, parallel=True,
+        )  # fmt: skip
+        outputs = np.ascontiguousarray(made[: len(self.channels)].transpose(2, 0, 1))
+        return outputs.transpose(1, 2, 0)  # plants apart in memory: residuals are read one by one
+
+    def tie(self, columns: Array) -> None:
+        """Complete columns: none needs it."""
+
+    checks: ClassVar[int] = 0
+
+    def violations(self, columns: Array) -> Array:
+        """Return by how much columns are not physical: bounds suffice."""
+        return np.zeros((len(columns), 0))
+
+    @property
+    def _weights(self) -> int:
+        """First row of the weights of the hysteresis in a column."""
+        return len(self.plant.names) + 2 + ELEMENTS
+
+    @property
+    def elements(self) -> int:
+        """Number of elements of the hysteresis with a weight that a fit adapts."""
+        operator = self.plant.hysteresis.operator
+        return len(getattr(operator, "weights", ()))
+
+    def declared(self, name: str) -> Declaration:
+        """Return the declaration of a free parameter."""
+        if name.startswith(WEIGHT):
+            return WEIGHTS
+        component, _, entry = name.partition(".")
+        return declarations(getattr(self.plant, component))[entry]
+
+    def free(self, name: str, **changes: Any) -> Free:
+        """Return the fit settings of a parameter; ``changes`` override its declaration."""
+        if name.startswith(WEIGHT):
+            place = self._weights + int(name.removeprefix(WEIGHT)[:-1])
+            usual = {"low": 0.0, "high": 1.0, "scale": 0.02, "prior": 25.0}
+            return Free(name, place, **{**usual, "start": float(self.column[place]), **changes})
+        d, value = self.declared(name), self.plant.value(name)
+        made: dict[str, Any] = {"low": d.low, "high": d.high, "start": value}
+        made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
+        place = self.plant.names.index(name)
+        return Free(name, place, **{**made, **self.settings.get(name, {}), **changes})
+
+    def base(self) -> tuple[Free, ...]:
+        """Return the base parameters, with those of effects that the plant already has."""
+        names = [n for n in self.settings if not (self.measured_drive and in_valve(n))]
+        names += [f"{WEIGHT}{k}]" for k in range(self.elements)]
+        present = [
+            name
+            for name, off in self.plant.neutral.items()
+            if name not in names
+            and name not in self.kept
+            and self.plant.value(name) != off
+            and not (self.measured_drive and in_valve(name))
+        ]
+        return tuple(self.free(name) for name in (*names, *present))
+
+    kept: ClassVar[frozenset[str]] = frozenset()
+    """Parameters with a neutral value that belong to the plant, and are not fitted."""
+
+    def plant_of(self, column: Array) -> Any:
+        """Return the plant with the parameters of a column."""
+        values: dict[str, Any] = dict(
+            zip(self.plant.names, map(float, column[: len(self.plant.names)]), strict=True)
+        )
+        n = self.elements
+        if n:
+            weights = tuple(map(float, column[self._weights : self._weights + n]))
+            operator = dataclasses.replace(self.plant.hysteresis.operator, weights=weights)
+            values["hysteresis.operator"] = operator
+        for substeps in (self.plant.substeps, *FINER):
+            try:
+                made = dataclasses.replace(self.plant, substeps=substeps).replace(values)
+                return dataclasses.replace(made, regulator=self.regulator or made.regulator)
+            except UnstableParameters as error:
+                unstable = error
+        raise unstable
+
+    def identified(self, plant: Any, frees: Iterable[Free], source: str) -> Any:
+        """Return a plant with the provenance of its fitted parameters."""
+        found = {f.name: ("identified", source) for f in frees if f.name in plant.names}
+        return dataclasses.replace(plant, provenance={**plant.provenance, **found})
+
+    def needs_of_any(self, recording: Recording, sheet: Rig) -> dict[str, tuple[bool, str]]:
+        """Return whether a recording meets the needs that all plants have in common, and why."""
+        return {
+            "pressure": (
+                any(c.startswith("pressure") for c in recording.outputs)
+                and not self.measured_drive,
+                "the pressures are inputs, for lack of commands"
+                if self.measured_drive
+                else "no pressure was recorded",
+            ),
+            "command": (
+                not self.measured_drive,
+                "no command was recorded, and the measured pressures drive the replay: the valve "
+                "cannot be judged",
+            ),
+            "temperature": (False, "the replay of this plant has no input for a temperature"),
+            "weighed": (False, "this plant has no parameter for an error of its loads"),
+            "valve_closed": (
+                longest_shut(recording) > SHUT_SECONDS and not self.measured_drive,
+                f"the valve was never shut for more than {SHUT_SECONDS:g} s (valve_closed in "
+                "RIG.yaml)",
+            ),
+            "rest": (
+                sheet.cycles_since_rest <= MANY_CYCLES,
+                f"the muscles had already made {sheet.cycles_since_rest} cycles since they rested",
+            ),
+        }
+
+
+def in_valve(name: str) -> bool:
+    """Return whether a parameter acts upstream of the pressure."""
+    return name.startswith(("regulator.", "valve."))
+
+
+def shut_off(values: Array, recording: Recording) -> Array:
+    """Return setpoints [Pa], below zero where the valve is shut, but for the start of a run."""
+    shut = recording.valve_closed & ~recording.restart
+    return np.where(shut, -1.0, np.maximum(0.0, values))
+
+
+def with_measured_drive(plant: Plant, period: float) -> Any:
+    """Return a plant whose pressures pass through readings that are its setpoints one row ahead.
+
+    Half a period of lag makes the mean delay zero (:func:`one_ahead`).
+    """
+    changes = {f"regulator.{name}": value for name, value in INSTANT.items()}
+    changes["regulator.time_constant"] = max(LEAST_LAG, 0.5 * period)
+    off = {n: v for n, v in plant.neutral.items() if in_valve(n)}
+    return plant.replace({n: v for n, v in {**off, **changes}.items() if n in plant.names})
+
+
+def one_ahead(values: Array, recording: Recording) -> Array:
+    """Return readings one row ahead within each run, shape (T,)."""
+    ahead = np.append(values[1:], values[-1])
+    last = np.append(recording.restart[1:], True)
+    return np.where(last, values, ahead)
+
+
+def calibrate_compiled(
+    family: Any, measured: Array, noise: Array, blocks: Blocks, time: Array, shapes: Array
+) -> Calibration:
+    """Fit the base of a plant: the regulator to the pressures alone, then all parameters."""
+    problem = Problem(family.simulate, measured, noise, blocks.train, time, family.tie, shapes)
+    frees, column = family.base(), family.column
+    valve = tuple(f for f in frees if in_valve(f.name))
+    alone = measured.copy()
+    pressures = np.array([c.startswith("pressure") for c in family.channels])
+    alone[~pressures] = np.nan
+    found: dict[str, float] = {}
+    if valve and np.isfinite(alone).any():
+        fit = Fit.at_start(valve, column)
+        only = dataclasses.replace(problem, measured=alone)
+        evaluate(only, [fit])
+        improve(only, [fit], VALVE_ROUNDS, 1e-4, FEW_DAMPINGS)
+        found, column = fit.values(), column_of(fit, fit.z)
+    starts = tuple(
+        dataclasses.replace(f, start=f.within(found[f.name])) if f.name in found else f
+        for f in frees
+    )
+    base = fit_base(problem, blocks, column, [starts], ROUNDS)
+    return Calibration(family, problem, base, found, None)

@@ -1,0 +1,98 @@
+"""Single muscle, the kind of plant whose base absorbs most differences between rigs."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from pam_envs.arrays import Array
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis.audit.audit import Audit, audit, unmet_needs
+from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.causes import by_name, catalogue
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.calibrate import Calibration, calibrate
+from pam_envs.diagnosis.fit.least_squares import Free
+from pam_envs.diagnosis.fit.single_muscle import (
+    CLOCK,
+    USUAL_ROWS,
+    MuscleFamily,
+    declared,
+    identified,
+    inputs_of,
+    start_plant,
+)
+from pam_envs.diagnosis.plant_protocol import Output, Parameter, Signals
+from pam_envs.parameters import Declaration
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+WEIGHT = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
+OFFSET = Declaration("s", -1.0, 1.0, "assumed", "offset of the readings' clock", 0.0)
+
+
+class BoundMuscle(MuscleFamily):
+    """Single muscle with the inputs of a recording."""
+
+    def declared(self, name: str) -> Parameter:
+        """Return the declaration of a free parameter."""
+        if name == CLOCK:
+            return OFFSET
+        if name.startswith("hysteresis.weight"):
+            return WEIGHT
+        found: Declaration = declared(self.plant, name)
+        return found
+
+    def unmet_needs(self, recording: Recording, sheet: Rig) -> dict[str, str]:
+        """Return the needs of causes that a recording does not meet, and why."""
+        return unmet_needs(recording, sheet)
+
+    def signals(self, recording: Recording, outputs: Array) -> Signals:
+        """Return contraction and pressure with command, load and temperature."""
+        r = recording
+        return Signals("pressure", r.command, outputs, r.load, r.temperature)
+
+    def identified(self, plant: Any, frees: Iterable[Free], source: str) -> SingleMuscle:
+        """Return a plant with the provenance of its fitted parameters."""
+        return identified(plant, frees, source)
+
+
+class MuscleKind:
+    """Single muscle that lifts a load."""
+
+    name = SingleMuscle.family
+    outputs = tuple(
+        Output(*pair)
+        for pair in zip(MuscleFamily.channels, MuscleFamily.fallback_noise, strict=True)
+    )
+    catalogue = catalogue()
+    weighed, experiments, loop_reason = True, True, ""
+
+    def start(self, sheet: Rig) -> SingleMuscle:
+        """Return the shipped muscle, scaled to the rig, without any effect."""
+        return start_plant(sheet).replace(sheet.parameters)
+
+    def causes(self, asked: Sequence[Cause]) -> tuple[Cause, ...]:
+        """Return the requested causes."""
+        return tuple(asked)
+
+    def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundMuscle:
+        """Return a muscle with the inputs of a recording."""
+        known = sheet.clock_tolerance
+        clock = USUAL_ROWS * recording.period if known is None else known
+        return BoundMuscle(plant, inputs_of(recording, sheet), clock)
+
+    def audit(self, recording: Recording, sheet: Rig) -> Audit:
+        """Return the findings on a recording before its diagnosis."""
+        return audit(recording, sheet)
+
+    def calibrate(
+        self,
+        family: Any,
+        measured: Array,
+        noise: Array,
+        blocks: Blocks,
+        time: Array,
+        shapes: Array,
+    ) -> Calibration:
+        """Fit regulator, static law and friction in stages."""
+        rates = by_name("slew_limit").forms
+        return calibrate(family, measured, noise, blocks, time, shapes, rates)

@@ -1,0 +1,1 @@
+"""Attacks on files, states, rows, caches and long commands, with counts of what passed."""

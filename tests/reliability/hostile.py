@@ -1,0 +1,352 @@
+"""Hostile files, tampered states and drawn actions in bulk, each kind in a process of its own."""
+
+import contextlib
+import dataclasses
+import functools
+import hashlib
+import json
+import lzma
+import os
+import random
+import resource
+import signal
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SECONDS = 5
+MEMORY = 2**30  # bytes beyond those of the process before
+CODE = ("os.system", "subprocess.Popen", "os.exec", "os.posix_spawn", "os.startfile", "os.fork")
+"""Audit events of code that a file runs."""
+Outcome = str
+Act = Callable[[int], Outcome]
+
+
+class Hang(BaseException):
+    """Takes more than ``SECONDS``."""
+
+
+def _hang(*_: object) -> None:
+    raise Hang
+
+
+def isolated(number: int, act: Act) -> Counter[Outcome]:
+    """Call ``act`` with 0, 1, ... in forks; count its outcomes, and crashes, which end a fork."""
+    counts: Counter[Outcome] = Counter()
+    first = 0
+    while first < number:
+        reading, writing = os.pipe()
+        pid = os.fork()
+        if pid == 0:
+            try:
+                _child(range(first, number), act, writing)
+            finally:
+                os._exit(0)
+        os.close(writing)
+        with open(reading, encoding="utf-8") as pipe:
+            found = pipe.read().split("\n")[:-1]
+        counts.update(found)
+        first += len(found)
+        if os.waitpid(pid, 0)[1] and first < number:
+            counts["crash"] += 1
+            first += 1
+    return counts
+
+
+def _child(numbers: range, act: Act, writing: int) -> None:
+    signal.signal(signal.SIGPROF, _hang)
+    ran: list[str] = []
+    sys.addaudithook(lambda event, _: ran.append(event) if event in CODE else None)
+    before = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for number in numbers:
+        ran.clear()
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)  # of computation
+        try:
+            outcome = act(number)
+        except Hang:
+            outcome = "hang"
+        except Exception as error:
+            outcome = f"traceback {type(error).__name__}"
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        if ran:
+            outcome = "code run"
+        if 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before > MEMORY:
+            outcome = "memory"
+            before += MEMORY
+        os.write(writing, f"{outcome}\n".encode())
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class Kind:
+    """A kind of file: its reader, good files, and crafted ones."""
+
+    name: str  # of a file
+    read: Callable[[Path], Any]
+    good: tuple[bytes, ...]
+    crafted: tuple[bytes, ...] = ()
+
+
+def kinds(folder: Path) -> Iterator[Kind]:
+    """Yield every kind of file that a stranger may give."""
+    from agents.policies.policy import OnnxPolicy
+    from agents.settings import presets
+    from agents.training import train
+    from benchmarks.runs import rows
+    from benchmarks.scenarios import scenario
+    from tests.agents import short_runs
+    from tests.data import test_hostile_files as files
+
+    yaml = tuple(text.encode() for text in files.crafted_yaml())
+    for name in (".plant", ".rig", ".csv"):
+        good = tuple(text.encode() for text in files.SEEDS[name])
+        crafted = yaml if name != ".csv" else tuple(t.encode() for t in files.crafted_csv())
+        yield Kind(f"file{name}", files.READERS[name], good, crafted)
+    places = sorted(scenario.FOLDER.glob("positioning_*.yaml"))
+    yield Kind(
+        "positioning_nominal.yaml", scenario.load, tuple(p.read_bytes() for p in places), yaml
+    )
+    path = presets.preset_path(short_runs.ID, "ppo")
+    yield Kind(path.name, presets.read, (path.read_bytes(),), yaml)
+    row = rows.path_of("positioning_nominal--inverse")
+    yield Kind(f"positioning_nominal/{row.name}", rows.load, (row.read_bytes(),))
+    resealed = functools.partial(_read_row, folder / "resealed" / row.parent.name / row.name)
+    yield Kind("row.json", resealed, (lzma.decompress(row.read_bytes()),))
+    short_runs.trained(folder / "run", short_runs.tiny(steps=256))
+    policy, checkpoint = ((folder / "run" / n) for n in ("policy.onnx", "checkpoint.pt"))
+    yield Kind("policy.onnx", OnnxPolicy.load, (policy.read_bytes(),))
+    head = 8 + 32
+    body = checkpoint.read_bytes()[head:]
+    yield Kind("checkpoint.pt", functools.partial(_read_checkpoint, train), (body,))
+
+
+def _read_row(path: Path, given: Path) -> None:
+    """Read a mutated row's text with a checksum that fits."""
+    from benchmarks.identity.hashing import digest
+    from benchmarks.runs import rows, store
+
+    text = given.read_bytes()
+    with contextlib.suppress(ValueError, TypeError, AttributeError, RecursionError):
+        record = json.loads(text)
+        record["checksum"] = digest(store.comparable(record))
+        text = json.dumps(record).encode()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(lzma.compress(text, preset=0))
+    try:
+        rows.load(path)
+    except ValueError as error:
+        raise ValueError(f"{error} {given.name}") from error
+
+
+def _read_checkpoint(train: Any, path: Path) -> None:
+    """Read a mutated checkpoint with a checksum that fits."""
+    from agents.training.checkpoint import MARK
+
+    body = path.read_bytes()
+    path.write_bytes(MARK + hashlib.sha256(body).digest() + body)
+    train.saved_run(path.parent)
+
+
+def files(folder: Path, number: int) -> Iterator[tuple[str, int, Counter[Outcome]]]:
+    """Yield the outcomes of ``number`` mutated files, over all kinds, and of the crafted ones."""
+    every = list(kinds(folder))
+    for k, kind in enumerate(every):
+        mutants = len(range(k, number, len(every)))
+        draws = random.Random(k)
+        contents = [mutated(draws.choice(kind.good), draws) for _ in range(mutants)]
+        contents += kind.crafted
+        place = folder / "tried" / kind.name
+        place.parent.mkdir(parents=True, exist_ok=True)
+
+        def act(i: int, kind: Kind = kind, place: Path = place, of: Any = contents) -> Outcome:
+            place.write_bytes(of[i])
+            try:
+                kind.read(place)
+            except ValueError as error:
+                text = str(error)
+                named = place.name in text and not {"\x1b", "\0"} & set(text)
+                return "refused" if named else "no name in the message"
+            return "read"
+
+        yield kind.name, len(contents), isolated(len(contents), act)
+
+
+def mutated(data: bytes, draws: random.Random) -> bytes:
+    """Return bytes with some of them changed, removed, doubled or inserted."""
+    made = bytearray(data)
+    for _ in range(draws.randint(1, 4)):
+        at, to = sorted(draws.randrange(len(made) + 1) for _ in range(2))
+        kind = draws.randrange(4)
+        if kind == 0 and at < len(made):
+            made[at] = draws.randrange(256)
+        elif kind == 1:
+            del made[at : min(to, at + 40)]
+        elif kind == 2:
+            made[at:at] = made[at : min(to, at + 4000)] * draws.randint(1, 3)
+        else:
+            words = (b"[", b"{", b"&a ", b"*a ", b"!!int ", b"\0", b"9" * 400, b":", b"null", b'""')
+            made[at:at] = draws.choice(words)
+    return bytes(made)
+
+
+# --- actions, states, checkpoints, cache ---------------------------------------------------------
+
+
+def actions(number: int) -> Iterator[tuple[str, int, Counter[Outcome]]]:
+    """Yield, for each environment, how drawn actions end, alone and in a batch."""
+    import gymnasium as gym
+
+    from tests.envs.cases import IDS
+    from tests.envs.core.test_actions import action
+
+    each = -(-number // (2 * len(IDS)))
+    for name in IDS:
+        draws = np.random.default_rng(IDS.index(name))
+        makers = (
+            lambda name=name: gym.make(name).unwrapped,
+            lambda name=name: gym.make_vec(name, 2, vectorization_mode="vector_entry_point"),
+        )
+        counts: Counter[Outcome] = Counter()
+        for make in makers:
+            env: Any = make()
+            env.reset(seed=0)
+
+            def act(_: int, env: Any = env, draws: Any = draws) -> Outcome:
+                drawn, good = action(draws, env.action_space.shape)
+                before = env.get_state()
+                try:
+                    env.step(drawn)
+                except ValueError:
+                    after = env.get_state()
+                    same = all(np.array_equal(after[key], before[key]) for key in before)
+                    return "refused" if same and not good else "good, refused"
+                return "accepted" if good else "bad, accepted"
+
+            counts += isolated(each, act)
+        yield name, 2 * each, counts
+
+
+def states(number: int, folder: Path) -> Iterator[tuple[str, int, Counter[Outcome]]]:
+    """Yield how single changed numbers of states and of checkpoints end, with steps after them."""
+    import gymnasium as gym
+
+    from tests.envs.cases import IDS
+
+    each = -(-number // (len(IDS) + 1))
+    for name in IDS:
+        env: Any = gym.make(name).unwrapped
+        env.reset(seed=3)
+        env.step(np.zeros(env.action_space.shape))
+        state = env.get_state()
+        draws = np.random.default_rng(IDS.index(name))
+
+        def act(_: int, env: Any = env, state: Any = state, draws: Any = draws) -> Outcome:
+            key = str(draws.choice(sorted(state)))
+            changed = state[key].copy()
+            place = tuple(int(draws.integers(n)) for n in changed.shape)
+            changed[place] = tampered(changed[place], draws)
+            if np.array_equal(changed, state[key], equal_nan=True):
+                return "refused"  # nothing was changed
+            try:
+                env.set_state({**state, key: changed})
+            except ValueError:
+                return "refused"
+            for _ in range(3):
+                env.step(np.zeros(env.action_space.shape))
+            return f"finite number of '{key}' accepted"
+
+        yield name, each, isolated(each, act)
+    yield "checkpoint.pt", each, checkpoints(each, folder)
+
+
+def tampered(value: Any, draws: np.random.Generator) -> Any:
+    """Return another number of the type of a value, often an extreme one."""
+    chosen = draws.choice([1e300, -1e300, 1e9, -1e9, 2.0**40, -3.0, 200.0, np.nan, np.inf])
+    kind = np.asarray(value).dtype
+    if kind.kind == "f":
+        return chosen
+    if kind.kind == "b":
+        return not value
+    bounds = np.iinfo(kind)
+    return max(bounds.min, min(bounds.max, int(np.nan_to_num(chosen, posinf=2**62))))
+
+
+def checkpoints(number: int, folder: Path) -> Counter[Outcome]:
+    """Return how checkpoints with one changed number and a new checksum end."""
+    import torch
+
+    from agents.training import checkpoint, train
+    from tests.agents import short_runs
+
+    short_runs.trained(folder / "trained", short_runs.tiny(steps=256))
+    good = checkpoint.load(folder / "trained/checkpoint.pt")
+    draws = np.random.default_rng(0)
+    target = folder / "tampered"
+    target.mkdir(exist_ok=True)
+
+    def act(_: int) -> Outcome:
+        content = checkpoint.load(folder / "trained/checkpoint.pt")
+        leaves = list(_leaves(content["snapshot"]))
+        holder, key, path = leaves[int(draws.integers(len(leaves)))]
+        value = holder[key]
+        if isinstance(value, torch.Tensor):
+            if not value.numel():
+                return "refused"
+            flat = value.reshape(-1)
+            place = int(draws.integers(len(flat)))
+            new = torch.tensor(tampered(flat[place].numpy(), draws)).to(value.dtype)
+            if torch.equal(flat[place], new):
+                return "refused"
+            flat[place] = new
+            holder[key] = flat.reshape(value.shape)
+        elif isinstance(value, (int, float)):
+            holder[key] = tampered(value, draws)
+        else:
+            holder[key] = None
+        checkpoint.save(target / "checkpoint.pt", content)
+        try:
+            run = train.saved_run(target)
+            model = train.resume(run)
+        except ValueError:
+            return "refused"
+        try:
+            model.learn(64, reset_num_timesteps=False)
+        except ValueError:  # torch finds an action that is not finite; a sentence for the user
+            return "refused"
+        return f"finite number of '{path}' accepted"
+
+    assert good
+    return isolated(number, act)
+
+
+def _leaves(value: Any, path: str = "") -> Iterator[tuple[Any, Any, str]]:
+    items = value.items() if isinstance(value, dict) else enumerate(value)
+    for key, entry in items:
+        place = path or str(key)
+        if isinstance(entry, (dict, list)):
+            yield from _leaves(entry, place)
+        else:
+            yield value, key, place
+
+
+def cache(number: int, folder: Path) -> Counter[Outcome]:
+    """Return how a file of the compile cache with one flipped bit is read."""
+    from pam_envs.kernels import cache as code
+
+    path = folder / "code.o"
+    code.write_whole(path, np.random.default_rng(0).bytes(20_000))
+    good, draws = path.read_bytes(), random.Random(0)
+    counts: Counter[Outcome] = Counter()
+    for _ in range(number):
+        bit = draws.randrange(8 * len(good))
+        bad = bytearray(good)
+        bad[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(bad)
+        counts["wrong code" if code.read_whole(path) is not None else "refused"] += 1
+    return counts
