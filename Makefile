@@ -16,7 +16,7 @@ export SDL_VIDEODRIVER ?= dummy
 
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help venv benchmark test lint format types layers check audit licences images docs docs-check wheel clean
+.PHONY: help venv benchmark test lint format types layers check audit licences images docs docs-check wheel install-check clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
@@ -71,6 +71,7 @@ licences: $(READY) ## Write the licences of the pinned packages into docs/licenc
 images: $(READY) ## Draw the pictures of the documentation
 	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --reference staircase --load 2.55 --episode-seconds 40 --plot docs/images/muscle_positioning.png
 	$(BIN)/python docs/make_images.py
+	$(BIN)/pam-envs render KneeWalk --seconds 5 --fps 10 --video docs/images/knee_walk.gif
 
 $(VENV)/.docs: $(READY)
 	@$(INSTALL) --editable ".[docs]" --constraint constraints.txt
@@ -93,6 +94,16 @@ docs-check: docs ## Look for broken links and errors of the built site in a brow
 wheel: $(READY) ## Build the wheel with compiled code of the default configurations
 	$(BIN)/python -m pam_envs.export.shipping
 	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+
+install-check: ## Install wheel and sdist into empty environments of PYTHON, run the start page
+	rm -rf build/install && mkdir -p build/install
+	$(PYTHON) -m venv build/install/build && build/install/build/bin/pip install -qq hatchling
+	build/install/build/bin/python -m hatchling build -d build/install/dist
+	for file in build/install/dist/pam_envs-*.whl build/install/dist/pam_envs-*.tar.gz; do \
+		rm -rf build/install/venv && $(PYTHON) -m venv build/install/venv && \
+		build/install/venv/bin/pip install -qq "$$file[baselines]" && \
+		build/install/venv/bin/python -P tests/run_page.py docs/start.md && \
+		build/install/venv/bin/pam-envs doctor || exit 1; done
 
 clean: ## Remove .venv, caches and builds; results stay
 	rm -rf $(VENV) build dist pam_envs/kernels/objects .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis

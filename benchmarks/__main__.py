@@ -161,7 +161,8 @@ def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
     from benchmarks.board import site as pages
 
     own = pages.OUT if results == rows.RESULTS else results / pages.OUT.name
-    written = pages.build(results, own if out is None else out)
+    with progress("tracks") as start:
+        written = pages.build(results, own if out is None else out, start)
     print(f"{len(written)} files; open {written[0]}")
     return 0
 
@@ -297,7 +298,8 @@ def papers(
     from benchmarks.papers.published import table
     from benchmarks.runs.store import write_record
 
-    figures = all_figures(paper, place)
+    with progress("groups of figures") as start:
+        figures = all_figures(paper, place, start)
     print(table(figures))
     if not paper and not place:
         print(f"\n{summary(figures)}")

@@ -24,6 +24,15 @@ Start = Callable[..., Advance]
 """``start(total, done=0)`` begins the count at ``done`` and returns what advances it."""
 
 
+def unnoticed(total: int, done: int = 0) -> Advance:
+    """Start a count that is not shown."""
+
+    def advance(count: int = 1, note: str = "") -> None:
+        return None
+
+    return advance
+
+
 def left(elapsed: float | None, done: float, total: float | None) -> str:
     """Return the remaining time at the mean rate so far: ``about 1:02:03``."""
     if elapsed is None or not done or total is None:

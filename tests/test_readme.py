@@ -43,6 +43,15 @@ def test_snippets_with_other_libraries_run(tmp_path, monkeypatch):
     assert (tmp_path / "rig.csv").read_text().startswith("time_s,segment,pressure_command_bar")
 
 
+def test_snippets_of_the_page_on_data_sets_run(monkeypatch):
+    pytest.importorskip("minari")
+    monkeypatch.chdir(ROOT)
+    names = run_snippets(ROOT / "docs/datasets.md")
+    first = [float(column[0]) for column in names["episode"].observations.values()]
+    assert names["observation"].tolist() == first
+    assert names["transitions"].actions.shape[1] == 1
+
+
 def test_snippets_of_the_start_page_run(capsys):
     names = run_snippets(ROOT / "docs/start.md")
     assert "mm, reference" in capsys.readouterr().out

@@ -21,6 +21,7 @@ from benchmarks.runs.store import CHECKSUM, read_json, write_folder
 from benchmarks.scoring.group import Column
 from benchmarks.scoring.metrics import COSTS, columns_of
 from benchmarks.scoring.statistics import Interval
+from sweeps.progress import Advance, Start, unnoticed
 
 ASSETS = Path(__file__).parent / "site_assets"
 OUT = Path(__file__).parents[1] / "site"
@@ -32,23 +33,28 @@ GROUPS = {
 """Parts of a track's table with their titles; the first has the track's round as its title."""
 
 
-def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
-    """Write the site from the rows of a folder; equal rows give equal bytes."""
+def build(results: Path = rows.RESULTS, out: Path = OUT, start: Start = unnoticed) -> list[Path]:
+    """Write the site from the rows of a folder; equal rows give equal bytes.
+
+    The progress counts the tracks twice: their tables, then their figures.
+    """
     all_rows = leaderboard.load(results)
-    texts = page(all_rows)
+    texts = page(all_rows, start)
     for row in all_rows:
         stored = read_json(rows.path_of(str(row["row"]), results))
         texts[f"rows/{row['row']}.json"] = _json(stored) + "\n"
     return write_folder(out, texts)
 
 
-def page(all_rows: Sequence[Row]) -> dict[str, str]:
+def page(all_rows: Sequence[Row], start: Start = unnoticed) -> dict[str, str]:
     """Return the site's files by their names, ``index.html`` first."""
+    advance = start(2 * len(standings.tracks(all_rows)))
     names = ("index.html", "page.css", "draw.js", "detail.js", "page.js")
     texts = {name: (ASSETS / name).read_text() for name in names}
-    texts["data/board.js"] = f"const BOARD = {_json(board(all_rows))};\n"
+    texts["data/board.js"] = f"const BOARD = {_json(board(all_rows, advance))};\n"
     for name, ordered in standings.tracks(all_rows).items():
         texts[f"figures/{name}.svg"] = plots.track_figure(ordered)
+        advance()
     for row in sorted(all_rows, key=lambda row: str(row["row"])):
         if row.get("traces"):
             call = f"loadTraces({_json(row['row'])}, {_json(row['traces'])});\n"
@@ -61,14 +67,18 @@ def _json(value: Any) -> str:
     return json.dumps(plain(value), separators=(",", ":"), allow_nan=False)
 
 
-def board(all_rows: Sequence[Row]) -> dict[str, Any]:
+def board(all_rows: Sequence[Row], advance: Advance | None = None) -> dict[str, Any]:
     """Return the content of the site without the trajectories, from rows in any order."""
-    tracks = standings.tracks(all_rows)
+    tracks, shown = standings.tracks(all_rows), []
+    for name, ordered in tracks.items():
+        shown.append(_track(name, ordered))
+        if advance is not None:
+            advance()
     changes = standings.changes(standings.ranked(tracks))
     kinds = {views.name_of(row): row["controller"]["kind"] for row in all_rows}
     return {
         "groups": [{"name": name, "title": title} for name, title in GROUPS.items()],
-        "tracks": [_track(name, ordered) for name, ordered in tracks.items()],
+        "tracks": shown,
         "winners": [_winner(found) for found in board_summary.nominal(tracks).values()],
         "changes": [_change(found, kinds) for found in changes],
     }

@@ -214,7 +214,7 @@ def _write(job: Job, behaviour: Behaviour, settings: dict[str, Any], start: Star
     env = gym.make(job.env, **job.arguments)
     base: Any = env.unwrapped
     count = -(-job.steps // base.setup.episode_steps)
-    rows = min(ROWS, count)
+    rows = -(-count // -(-count // ROWS))  # equal batches
     batch = gym.make_vec(job.env, rows, vectorization_mode="vector_entry_point", **job.arguments)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # asks for addresses of code and author

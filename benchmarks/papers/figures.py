@@ -14,6 +14,7 @@ from benchmarks.papers import (
     positioning,
 )
 from benchmarks.papers.published import Figure, Group, compared
+from sweeps.progress import Start, unnoticed
 
 BY_PAPER: dict[str, tuple[Group, ...]] = {
     "yeh2010": (*equations.KNEE_GROUPS, *knee.GROUPS, *gait.GROUPS, *knee_envs.GROUPS),
@@ -24,7 +25,9 @@ BY_PAPER: dict[str, tuple[Group, ...]] = {
 GROUPS: tuple[Group, ...] = tuple(group for groups in BY_PAPER.values() for group in groups)
 
 
-def all_figures(papers: Sequence[str] = (), places: Sequence[str] = ()) -> list[Figure]:
+def all_figures(
+    papers: Sequence[str] = (), places: Sequence[str] = (), start: Start = unnoticed
+) -> list[Figure]:
     """Return every figure, or those of some papers and places of the inventory.
 
     A group that fails is replaced by one line with the reason.
@@ -37,6 +40,7 @@ def all_figures(papers: Sequence[str] = (), places: Sequence[str] = ()) -> list[
         if place not in listed:
             raise ValueError(f"no place {place!r} in the inventory; an example is 'Eq. (1)'")
     figures: list[Figure] = []
+    advance = start(sum(len(BY_PAPER[name]) for name in papers or BY_PAPER))
     for paper in papers or BY_PAPER:
         for group in BY_PAPER[paper]:
             try:
@@ -44,5 +48,6 @@ def all_figures(papers: Sequence[str] = (), places: Sequence[str] = ()) -> list[
             except (ModuleNotFoundError, AttributeError) as error:
                 title = (group.__doc__ or group.__name__).splitlines()[0].rstrip(".")
                 figures.append(Figure(title, None, note=f"not there: {error}"))
+            advance(note=f", {paper}")
         figures += inventory.stated(paper)
     return [f for f in figures if not places or not {*places}.isdisjoint(f.places)]

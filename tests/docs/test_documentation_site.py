@@ -58,8 +58,9 @@ def test_pages_have_no_console_error_are_accessible_and_fit_a_phone(site):
 def test_faults_of_a_page_are_found(tmp_path):
     wide, broken = tmp_path / "wide.html", tmp_path / "broken.html"
     phone = '<meta name="viewport" content="width=device-width">'
-    wide.write_text(f'{phone}<article><div style="width: 900px">x</div></article>')
-    broken.write_text('<a href="none.html">x</a><script>console.error("amiss")</script>')
+    start = f'<!doctype html><html lang="en"><title>x</title>{phone}<main><h1>x</h1>'
+    wide.write_text(f'{start}<article><div style="width: 900px">x</div></article>')
+    broken.write_text(f'{start}<a href="none.html">x</a><script>console.error("amiss")</script>')
     found = list(faults_in_browser([wide, broken], PROGRAM))
     assert ["pixels wide instead of 390" in found[0], "amiss" in found[1]] == [True, True]
     assert list(broken_links(tmp_path)) == [

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from pam_envs.envs.rendering import scene as S
 
-KNEE: S.Point = (160.0, 225.0)
+KNEE: S.Point = (172.0, 243.0)
 """Position of the knee's axis [pixels]."""
-PER_METRE = 400.0
-GROUND = 430.0
+PER_METRE = 355.0
+GROUND = 420.0
 TORQUE_SPAN = 30.0
 """Torque [N m] at the end of a bar."""
 

@@ -243,3 +243,11 @@ def test_rows_of_a_run_make_a_board_and_a_page_with_their_trajectories(track, fo
     assert len(output) == len(pressure) > 90
     assert 0.0 < output.max() < 0.05  # m
     assert 1e4 < pressure.max() < 1e6  # Pa
+    totals, done = [], []
+
+    def start(total: int):
+        totals.append(total)
+        return lambda count=1, note="": done.append(count)
+
+    site.build(out, folder / "again", start)
+    assert sum(done) == totals[0] == 2  # the track's table and its figure

@@ -25,8 +25,25 @@ SECTIONS = ("1.1", *(f"2.{n}" for n in range(1, 13)), *(f"3.{n}" for n in range(
 
 
 @pytest.fixture(scope="module")
-def rows() -> list[Figure]:
-    return papers.all_figures()
+def counted() -> tuple[list[Figure], list[int]]:
+    """Return all figures, and what their progress counted: the total, then each step."""
+    counts: list[int] = []
+
+    def start(total: int):
+        counts.append(total)
+        return lambda count=1, note="": counts.append(count)
+
+    return papers.all_figures(start=start), counts
+
+
+@pytest.fixture(scope="module")
+def rows(counted) -> list[Figure]:
+    return counted[0]
+
+
+def test_progress_counts_every_group_of_figures(counted):
+    total, *steps = counted[1]
+    assert total == sum(steps) == len(papers.GROUPS)
 
 
 @pytest.mark.parametrize("paper", NUMBERS)
