@@ -355,8 +355,8 @@ def speed(only: tuple[str, ...] = (), rounds: int = 7, json: Path | None = None)
     """Measure speed, interleaved with other environments, and compare with the targets.
 
     Args:
-        only: Groups to measure: single, batch, air, plain, start, learning, diagnosis. All by
-            default.
+        only: Groups to measure: single, batch, air, planning, controllers, plain, start, learning,
+            diagnosis. All by default.
         rounds: Number of interleaved rounds; the median counts.
         json: Also write the figures to this file.
     """

@@ -9,7 +9,8 @@ distributions (:mod:`pam_envs.entry_points`); command lines read the last two as
 A controller is built from a nominal plant and the named signals, never from an environment. Its
 model knowledge is part of its result. For "nominal model" the caller provides the model: if that is
 the simulated plant itself without randomization, the controller knows the true model, and a table
-of results should report it.
+of results should report it. For "true model" (:mod:`baselines.core.informed`) it provides the plant
+of the episode, with the parameters that were drawn.
 
 Numbers that neither a rule nor a paper fixes are *knobs* (:mod:`baselines.core.entry`). Names with
 ``_tuned`` are controllers with knobs from a search (:mod:`baselines.core.tuned`).
@@ -24,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import baselines
-from baselines.core import tuned
+from baselines.core import informed, tuned
 from baselines.core.controller import Controller
 from baselines.core.entry import AS_DESIGNED, Entry, Knobs, Spec, check_knobs
 from pam_envs import entry_points
@@ -132,6 +133,7 @@ def _collect() -> None:
         if not found.name.startswith(f"{package}.core"):
             _register_entries(importlib.import_module(found.name))
     CONTROLLERS.update(tuned.entries(PUBLISHED, tuned.read()))
+    CONTROLLERS.update(informed.entries(PUBLISHED))
     entry_points.each(entry_points.CONTROLLERS, lambda found: _register_entries(found.load()))
     for folder in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
         load(folder)

@@ -5,16 +5,19 @@ as the search over a learned controller's settings. Its result is for one enviro
 separate entry beside the controller as published.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from baselines.core.entry import SUFFIXES, Entry, Knobs, check_knobs
+from baselines.core.entry import SUFFIXES, Bounds, Entry, Knobs, check_knobs
 from pam_envs import yaml_file
 
 FILE = Path(__file__).with_name("tuned.yaml")
 SCHEMA = 1
+EDGE = 0.05
+"""Distance from an end of the search, over its logarithmic range, that counts as on the bound."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,8 @@ class Tuned:
 
     Attributes
     ----------
+    bounds : mapping
+        Lowest and highest factor of each knob in the search.
     trials, seed : int
         Number of settings tried, and seed of the search.
     before, after : float
@@ -34,6 +39,7 @@ class Tuned:
     controller: str
     env: str
     knobs: Knobs
+    bounds: Bounds
     trials: int
     seed: int
     before: float
@@ -44,6 +50,16 @@ class Tuned:
     def name(self) -> str:
         """Name in the catalogue."""
         return tuned_name(self.controller, self.env)
+
+    @property
+    def on_bounds(self) -> tuple[str, ...]:
+        """Knobs whose optimum is on a bound of the search, so that a better one may be beyond."""
+        return tuple(
+            name
+            for name, value in self.knobs.items()
+            for low, high in (self.bounds[name],)
+            if not EDGE < math.log(value / low) / math.log(high / low) < 1.0 - EDGE
+        )
 
 
 def tuned_name(controller: str, env: str) -> str:
@@ -64,11 +80,17 @@ def read(file: Path = FILE) -> dict[str, Tuned]:
 
 def _read(name: str, record: Mapping[str, Any]) -> Tuned:
     try:
-        made = Tuned(**record)
+        bounds = {knob: tuple(ends) for knob, ends in record.get("bounds", {}).items()}
+        made = Tuned(**{**record, "bounds": bounds})
     except TypeError as error:
         raise ValueError(
             f"{FILE.name}: {name}: {error}; search again, or remove the entry"
         ) from error
+    if lacking := [knob for knob in made.knobs if knob not in made.bounds]:
+        raise ValueError(
+            f"{FILE.name}: {name} has no bounds of {', '.join(lacking)}; search again, or remove "
+            "the entry"
+        )
     if made.name != name:
         raise ValueError(
             f"{FILE.name}: {name} belongs to {made.controller} in {made.env}; name it {made.name}"

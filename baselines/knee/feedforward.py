@@ -35,7 +35,7 @@ from pam_envs.parameters import Signal
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 Kind = Literal["nominal", "line", "inverse"]
-KNOBS: Bounds = {"lead": (0.25, 4.0)}
+KNOBS: Bounds = {"lead": (0.05, 4.0)}
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.runs.cells import AUDIT, PUBLIC
+from benchmarks.runs.knowledge import TRUE
 from benchmarks.runs.rows import Row, episodes_of, scores_of
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import statistics
@@ -62,6 +63,11 @@ def headlines(row: Mapping[str, Any]) -> tuple[Column, ...]:
 def is_classical(row: Mapping[str, Any]) -> bool:
     """Return whether the row's controller has no learned part."""
     return bool(row["controller"]["kind"] == "classical")
+
+
+def is_informed(row: Mapping[str, Any]) -> bool:
+    """Return whether the row's controller is designed from the plant of each episode."""
+    return bool(row["controller"].get("claimed") == TRUE)
 
 
 def is_audited(row: Mapping[str, Any]) -> bool:

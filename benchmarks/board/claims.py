@@ -34,8 +34,12 @@ class Claim:
 
 
 def is_paper(row: Row) -> bool:
-    """Return whether a row is of a paper's method or a textbook rule: classical, with a source."""
-    return views.is_classical(row) and bool(row["controller"]["citation"])
+    """Return whether a row is of a paper's method or a textbook rule: classical, with a source.
+
+    A controller that is designed from the plant of each episode is not: it knows more.
+    """
+    sourced = views.is_classical(row) and bool(row["controller"]["citation"])
+    return sourced and not views.is_informed(row)
 
 
 def best_paper(rows: Sequence[Row]) -> Row | None:

@@ -112,12 +112,13 @@ def _verdicts(ordered: Track, made: Sequence[Claim]) -> list[str]:
 
 
 def _scores(listing: Listing, made: Sequence[Claim]) -> list[str]:
-    """Return the tables of scores: ranked rows, rows with few training seeds, rows outside."""
+    """Return the tables of scores: ranked rows, then those that are listed apart."""
     probabilities = {views.name_of(entry.row): entry.probability for entry in made}
     groups = (
         ("", listing.ranked, [str(place) for place in standings.ranks(listing.ranked)]),
         (f"Not ranked, fewer than {views.LISTED_SEEDS} training seeds:", listing.few, None),
         ("Not in the audit round, not ranked, public episodes:", listing.outside, None),
+        ("Designed from the plant of each episode, not ranked:", listing.informed, None),
     )
     lines: list[str] = []
     for title, rows, places in groups:

@@ -29,6 +29,7 @@ GROUPS = {
     "ranked": "",
     "few": f"Not ranked: fewer than {views.LISTED_SEEDS} training seeds",
     "outside": "Not ranked, not in the audit round: all numbers are of the public episodes",
+    "informed": "Not ranked: designed from the plant of each episode",
 }
 """Parts of a track's table with their titles; the first has the track's round as its title."""
 
@@ -129,7 +130,8 @@ def _rows(
         zip((r["row"] for r in listing.ranked), standings.ranks(listing.ranked), strict=True)
     )
     shown = []
-    for group, own in zip(GROUPS, (listing.ranked, listing.few, listing.outside), strict=True):
+    parts = (listing.ranked, listing.few, listing.outside, listing.informed)
+    for group, own in zip(GROUPS, parts, strict=True):
         for row in own:
             place = ranks.get(row["row"])
             placed = {"group": group, "rank": str(place or "-"), "place": place and place.first}

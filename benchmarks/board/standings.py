@@ -34,6 +34,7 @@ class Listing:
     few: Track  # too few training seeds for a rank
     outside: Track  # not in the round
     missing: tuple[str, ...]  # controllers in the round without a row
+    informed: Track  # designed from the plant of each episode
 
     @property
     def inside(self) -> Track:
@@ -84,16 +85,19 @@ def ordered(rows: Sequence[Row]) -> Track:
 
 def listing(rows: Sequence[Row]) -> Listing:
     """Return the rows of a track that are compared and those that are listed apart."""
-    best_first = ordered(rows)
+    every = ordered(rows)
+    best_first = [row for row in every if not views.is_informed(row)]
     audited = [row for row in best_first if views.is_audited(row)]
     inside = audited or best_first
-    present = {views.name_of(row) for row in inside}
+    informed = [row for row in every if views.is_informed(row)]
+    present = {views.name_of(row) for row in (*inside, *filter(views.is_audited, informed))}
     entrants = audited[0]["audit"]["entrants"] if audited else ()
     return Listing(
         ranked=[row for row in inside if views.is_listed(row)],
         few=[row for row in inside if not views.is_listed(row)],
         outside=best_first[len(inside) :],
         missing=tuple(sorted(set(entrants) - present)),
+        informed=informed,
     )
 
 

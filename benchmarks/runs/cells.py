@@ -18,7 +18,13 @@ from benchmarks.identity.hashing import arrays_digest, digest
 from benchmarks.runs import controllers, knowledge, provenance, rollout, traces
 from benchmarks.runs.controllers import Entrant
 from benchmarks.scenarios.scenario import Scenario, ScenarioSet
-from benchmarks.scenarios.scenario_env import make_batch, make_env, model_of, plant_digests
+from benchmarks.scenarios.scenario_env import (
+    drawn_plant,
+    make_batch,
+    make_env,
+    model_of,
+    plant_digests,
+)
 from benchmarks.scoring.metrics import scores_of
 
 SCHEMA = 3
@@ -125,7 +131,9 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
     }
     if entrant.files:
         said["card"] = trainings.card_record(controller)
-    episodes = iter(episodes_of(group, env, controller))
+    informed = knowledge.is_informed(entrant) and env.unwrapped.setup.drawn
+    run = informed_episodes(group, env) if informed else episodes_of(group, env, controller)
+    episodes = iter(run)
     records = {}
     for cell in group.cells:
         record = {**said, "split": cell.split}
@@ -156,6 +164,16 @@ def episodes_of(group: Group, env: Any, controller: Any) -> list[rollout.Episode
     batches = partial(make_batch, first.track.env, first.scenario.kwargs)
     seeds = [seed for cell in group.cells for seed in cell.seeds]
     return rollout.run_all(batches, env, controller, seeds)
+
+
+def informed_episodes(group: Group, env: Any) -> list[rollout.Episode]:
+    """Return the episodes of a controller that is designed from the plant drawn in each."""
+    made = []
+    for seed in (seed for cell in group.cells for seed in cell.seeds):
+        env.reset(seed=seed)
+        controller = controllers.make(group.cells[0].entrant, drawn_plant(env), env)
+        made.append(rollout.run(env, controller, seed))
+    return made
 
 
 def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str, Any]:

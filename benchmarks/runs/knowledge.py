@@ -23,12 +23,19 @@ def of_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> dict[st
     base, card = env.unwrapped, getattr(controller, "card", None)
     plant, drawn = base.plant.digest(), base.setup.drawn
     same = model.digest() == plant
+    if is_informed(entrant):
+        return {"knows_plant": same or drawn, "trained_on_plant": False}
     if not isinstance(card, Mapping):
         return {"knows_plant": same and not drawn, "trained_on_plant": False}
     varied = bool((card.get("env_kwargs") or {}).get("randomize"))
     met = plant in card.get("plants", [card.get("plant")])
     knows = (entrant.kind == "learned" or same) and met and not varied and not drawn
     return {"knows_plant": knows, "trained_on_plant": (varied and drawn) or (met and not same)}
+
+
+def is_informed(entrant: Entrant) -> bool:
+    """Return whether a controller is designed from the plant of each episode."""
+    return entrant.knowledge == TRUE
 
 
 def label(claimed: str, cells: Sequence[Mapping[str, Any]]) -> str:

@@ -242,6 +242,7 @@ def _found(job: Job, study: optuna.Study) -> Tuned:
         controller=job.controller,
         env=job.env,
         knobs=_proposed(optuna.trial.FixedTrial(best.params), job.bounds),
+        bounds=dict(job.bounds),
         trials=len(_finished(study)),
         seed=job.seed,
         before=float(f"{study.user_attrs[UNTUNED]['error']:.6g}"),
@@ -254,7 +255,8 @@ def sentence(found: Tuned) -> str:
     """Return the result of a search in one line."""
     turned = ", ".join(f"{name} {value:g}" for name, value in found.knobs.items())
     change = f"{found.before:.4g} to {found.after:.4g} in {found.trials} trials"
-    return f"{found.name}: {change}, with {turned}"
+    edge = f"; on a bound: {', '.join(found.on_bounds)}: widen it" if found.on_bounds else ""
+    return f"{found.name}: {change}, with {turned}{edge}"
 
 
 def write(found: Tuned, file: Path = tuned.FILE) -> None:

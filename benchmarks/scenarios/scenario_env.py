@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 
 from benchmarks.scenarios.scenario import Scenario
+from pam_envs.envs.core.step import MEMBER
 
 PLANTS = Path(__file__).parent / "plants"
 """Folder of the plants that scenario files name."""
@@ -62,6 +64,33 @@ def plant_digests(scenario: Scenario) -> dict[str, str]:
     named = (given.get("plant") for given in (scenario.kwargs, scenario.model))
     files = {name: plant_file(name) for name in named if isinstance(name, str)}
     return {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in files.items()}
+
+
+def drawn_plant(env: Any) -> Any:
+    """Return the plant of the present episode of a single environment, with drawn parameters.
+
+    Raises
+    ------
+    ValueError
+        If the plant with these parameters is another one than that of the environment.
+    """
+    base = env.unwrapped
+    state, setup = base.get_state(), base.setup
+    column = state["fixed"][0, :, 0]
+    member = setup.plant.members()[int(state["counts"][0, MEMBER, 0])]
+    own = member.parameter_rows()
+    values = {
+        name: float(value)
+        for name, value, usual in zip(member.names, column, own, strict=False)
+        if value != usual
+    }
+    plant = member.replace(values)
+    if not np.array_equal(plant.parameter_rows(), column):
+        raise ValueError(
+            f"{type(plant).__name__}: the drawn parameters {', '.join(values)} do not make the "
+            "plant of the episode; a parameter is derived from another one"
+        )
+    return plant
 
 
 def model_of(env_id: str, scenario: Scenario, env: Any) -> Any:

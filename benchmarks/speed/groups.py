@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from benchmarks.speed import probes
+from benchmarks.speed.controllers import controllers
 from benchmarks.speed.diagnosis import diagnosing
 from benchmarks.speed.learning import learning, shares
 from benchmarks.speed.rates import Measurement, Missing
@@ -16,6 +17,7 @@ GROUPS: dict[str, tuple[Probe, ...]] = {
     "batch": (probes.batch, probes.variants, probes.growth, probes.cores, probes.processes),
     "air": (probes.airs,),
     "planning": (probes.planning,),
+    "controllers": (controllers,),
     "plain": (probes.uncompiled,),
     "start": (probes.start_up,),
     "learning": (learning, shares),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.board import accessors as views
-from benchmarks.board import standings
+from benchmarks.board import claims, standings
 
 
 def places(rows: list[dict]) -> dict[str, str]:
@@ -63,6 +63,16 @@ def test_rows_outside_the_round_or_with_few_seeds_are_listed_apart():
     assert (found.split, found.missing) == ("audit", ())
     shorter = standings.listing([row for row in first if views.name_of(row) != "pid"])
     assert shorter.missing == ("pid",)
+
+
+def test_controllers_with_the_plant_of_each_episode_are_listed_apart():
+    nominal, informed = fakes.row("a", 2e-3, citation="x"), fakes.row("b", 1e-3, citation="x")
+    informed["controller"]["claimed"] = "true model"
+    found = standings.listing([nominal, informed])
+    assert [views.name_of(row) for row in found.ranked] == ["a"]
+    assert [views.name_of(row) for row in found.informed] == ["b"]
+    best = claims.best_paper([nominal, informed])
+    assert best is not None and views.name_of(best) == "a"
 
 
 def test_without_a_round_all_rows_are_ranked_by_public_episodes():

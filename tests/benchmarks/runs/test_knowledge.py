@@ -93,6 +93,17 @@ class Policy:
         self.card = {"plants": plants, "env_kwargs": env_kwargs}
 
 
+def test_informed_controller_knows_drawn_plants():
+    name = "PAM/MusclePositioning-v0"
+    env, drawn = make_env(name, {}), make_env(name, {"randomize": True})
+    informed, nominal = find("inverse_informed"), find("inverse")
+    plant, other = env.unwrapped.plant, foil(env.unwrapped.plant)
+    assert knowledge.of_plant(informed, object(), plant, drawn)["knows_plant"]
+    assert not knowledge.of_plant(nominal, object(), plant, drawn)["knows_plant"]
+    assert not knowledge.of_plant(informed, object(), other, env)["knows_plant"]
+    assert knowledge.label("true model", [KNOWS]) == "true model"
+
+
 def test_policy_trained_on_an_undeclared_plant_is_reported_as_such():
     name, ppo = "PAM/MusclePositioning-v0", find("ppo")
     env, drawn = make_env(name, {"hysteresis": "preisach"}), make_env(name, {"randomize": True})

@@ -8,6 +8,7 @@ import pytest
 
 from agents.settings import seeds
 from baselines.core import tuned
+from baselines.core.catalogue import PUBLISHED
 from baselines.core.entry import Knobs
 from benchmarks.runs import tuning
 from benchmarks.runs.tuning import Course, Job, Measured, job_of, seeds_of, worth
@@ -168,12 +169,25 @@ def test_command_repeats_the_search():
     )
 
 
+def test_optimum_on_a_bound_is_reported(tmp_path):
+    one = tuning.search(job(tmp_path, trials=3), bowl)
+    inside, edge = (
+        dataclasses.replace(one, knobs={"reach": r}, bounds={"reach": (0.5, 2.0)})
+        for r in (1, 1.99)
+    )
+    assert "bound" not in tuning.sentence(inside)
+    assert tuning.sentence(edge).endswith("; on a bound: reach: widen it")
+
+
 def test_result_is_written_beside_earlier_ones(tmp_path):
     file = tmp_path / "tuned.yaml"
     file.write_text("# A head line.\nschema: 1\ntuned: {}\n")
     one = tuning.search(job(tmp_path, trials=3), bowl)
-    assert tuning.sentence(one).startswith("pid_tuned: 1 to 0.7945 in 3 trials, with closed_loop")
-    two = dataclasses.replace(one, controller="inverse", knobs={"lead": 1.25})
+    said = f"pid_tuned: 1 to {one.after:.4g} in 3 trials, with closed_loop"
+    assert tuning.sentence(one).startswith(said)
+    assert one.bounds == PUBLISHED["pid"].knobs
+    lead = {"knobs": {"lead": 1.25}, "bounds": {"lead": (0.5, 2.0)}}
+    two = dataclasses.replace(one, controller="inverse", **lead)
     for found in (one, two, dataclasses.replace(one, trials=20)):
         tuning.write(found, file)
     assert file.read_text().startswith("# A head line.\nschema: 1\ntuned:\n  inverse_tuned:\n")

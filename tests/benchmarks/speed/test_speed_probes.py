@@ -2,9 +2,12 @@
 
 from types import SimpleNamespace
 
+import gymnasium as gym
+import numpy as np
 import pytest
 from gymnasium.vector import VectorEnv
 
+from benchmarks.speed import controllers as speed_controllers
 from benchmarks.speed import learning as speed_learning
 from benchmarks.speed import probes, rates
 from benchmarks.speed.groups import measure
@@ -34,6 +37,33 @@ def test_environment_share_refers_to_the_whole_rollout(monkeypatch, rest, share,
     assert found.value == pytest.approx(share)
     assert found.verdict == verdict
     assert "KneeWalk" in found.name
+
+
+def test_time_of_an_action_is_compared_with_the_control_period(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(speed_controllers, "time", SimpleNamespace(process_time=lambda: now[0]))
+
+    class Slow:
+        """A controller that takes 2 ms for an action, and 30 ms for the hundredth."""
+
+        def predict(self, observation, state, start, deterministic):
+            count = 0 if start else state + 1
+            now[0] += 0.03 if count == 99 else 0.002
+            return np.zeros(1, np.float32), count
+
+    def design(*_):
+        now[0] += 1.5
+        return Slow()
+
+    monkeypatch.setattr(speed_controllers, "make_controller", design)
+    env = gym.make("PAM/MusclePositioning-v0").unwrapped
+    found = speed_controllers.timed("slow", env, 3)
+    assert found.value == pytest.approx(1e6 * (199 * 0.002 + 0.03) / 200)
+    assert found.floor == pytest.approx(1e4)
+    assert found.verdict == "pass"
+    assert "design 1.5 s" in found.note
+    monkeypatch.setattr(speed_controllers, "make_controller", lambda *_: 1 / 0)
+    assert speed_controllers.timed("broken", env, 3).verdict == "not measured"
 
 
 @pytest.mark.parametrize("variant", ["", "residual"])
