@@ -171,7 +171,7 @@ def test_failed_write_keeps_old_file(plain_page, tmp_path, monkeypatch):
     folder = folder_of(tmp_path)
     before = (folder / "report.html").read_bytes()
     monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "disk is full")))
-    with pytest.raises(OSError, match=r"disk is full.*plant\.yaml"):
+    with pytest.raises(OSError, match=r"disk is full.*report\.html"):
         write(fakes.diagnosis("ambiguous"), folder)
     assert {p.name for p in folder.iterdir()} == FILES
     assert (folder / "report.html").read_bytes() == before
