@@ -62,8 +62,8 @@ layers: $(READY) ## Check which way imports run
 check: lint types layers test ## All of the above checks
 
 audit: $(READY) ## Look up known vulnerabilities of the pinned packages
-	@$(INSTALL) pip-audit || { echo "make audit needs the network, to install pip-audit" >&2; exit 1; }
-	$(BIN)/pip-audit --progress-spinner off --no-deps --disable-pip --requirement constraints.txt
+	@$(INSTALL) pip-audit --constraint constraints.txt || { echo "make audit needs the network, to install pip-audit" >&2; exit 1; }
+	@$(BIN)/pip-audit --strict --progress-spinner off --no-deps --disable-pip --requirement constraints.txt || { echo "make audit: a pinned package has a known vulnerability, or the public list does not answer; see above" >&2; exit 1; }
 
 licences: $(READY) ## Write the licences of the pinned packages into docs/licences.md
 	$(BIN)/python docs/make_licences.py

@@ -47,8 +47,8 @@ def _client(address: str) -> Client:
         return Client(address, timeout=SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ValueError(
-            f"no Dask scheduler answers at {address!r} ({error}); start one with `dask scheduler`, "
-            "and workers in a checkout with `dask worker ADDRESS --nworkers 2 --nthreads 1`"
+            f"no Dask scheduler answers at {address!r} ({error}); start it and its workers by the "
+            "commands of docs/sweeps.md, which listen on the loopback"
         ) from error
 
 

@@ -69,7 +69,9 @@ def restore(model: BaseAlgorithm, snapshot: dict[str, Any]) -> None:
     assert env is not None
     if snapshot["counters"]["num_timesteps"] > 0:  # the wrappers have all their arrays then
         _begin(model, env)
-    check(snapshot, tensors(take(model)), "snapshot")
+    own = tensors(take(model))
+    check(snapshot, own, "snapshot")
+    _check_groups(snapshot["parameters"], own["parameters"])
     _check_replay(model, snapshot["replay"])
     model.set_parameters(snapshot["parameters"], exact_match=True, device="cpu")
     _check_optimizers(model)
@@ -145,6 +147,16 @@ def _begin(model: BaseAlgorithm, env: VecEnv) -> None:
     model._last_original_obs = first if known else None
 
 
+def _check_groups(given: dict[str, Any], own: dict[str, Any]) -> None:
+    """Raise ValueError unless the settings of each optimiser, but its rate, are the model's own."""
+    for name, state in own.items():
+        for mine, theirs in zip(
+            state.get("param_groups", ()), given[name].get("param_groups", ()), strict=True
+        ):
+            if {**theirs, "lr": 0.0} != {**mine, "lr": 0.0} or not 0.0 <= theirs["lr"] <= 1.0:
+                raise ValueError(f"snapshot/parameters/{name} has other settings than the model")
+
+
 def _check_optimizers(model: BaseAlgorithm) -> None:
     """Raise ValueError unless the moments of each optimiser have the shapes of its parameters."""
     for name in model._get_torch_save_params()[0]:
@@ -154,6 +166,8 @@ def _check_optimizers(model: BaseAlgorithm) -> None:
             good = [torch.is_tensor(m) and m.shape in (parameter.shape, ()) for m in state.values()]
             if not all(good) or state.keys() != ADAM:
                 raise ValueError(f"the moments of {name} do not have the shapes of its parameters")
+            if not 0.0 <= float(state["step"]) <= MOST:
+                raise ValueError(f"the number of steps of {name} is out of range")
 
 
 def _check_replay(model: BaseAlgorithm, saved: dict[str, Any] | None) -> None:

@@ -81,7 +81,7 @@ def _settings(content: dict[str, Any]) -> dict[str, Any]:
             raise ValueError("seed")
         return {key: settings[key] for key in ("config", "seed", "plants")}
     except (KeyError, TypeError, ValueError, RecursionError) as error:
-        raise CheckpointError("the checkpoint lacks the settings of its training") from error
+        raise CheckpointError(f"{CHECKPOINT} lacks the settings of its training") from error
 
 
 def resume(run: Run) -> BaseAlgorithm:

@@ -21,6 +21,8 @@ import numpy as np
 from tests.mutation import mutated
 
 SECONDS = 5
+WHOLE = 11_000
+"""Number of mutated files with which all crafted ones are tried."""
 MEMORY = 2**30  # bytes beyond those of the process before
 CODE = ("os.system", "subprocess.Popen", "os.exec", "os.posix_spawn", "os.startfile", "os.fork")
 """Audit events of code that a file runs."""
@@ -156,13 +158,13 @@ def _read_checkpoint(train: Any, path: Path) -> None:
 
 
 def files(folder: Path, number: int) -> Iterator[tuple[str, int, Counter[Outcome]]]:
-    """Yield the outcomes of ``number`` mutated files, over all kinds, and of the crafted ones."""
+    """Yield the outcomes of mutated files of all kinds, and of a share of the crafted ones."""
     every = list(kinds(folder))
     for k, kind in enumerate(every):
         mutants = len(range(k, number, len(every)))
         draws = random.Random(k)
         contents = [mutated(draws.choice(kind.good), draws) for _ in range(mutants)]
-        contents += kind.crafted
+        contents += kind.crafted[:: max(1, WHOLE // number)]
         place = folder / "tried" / kind.name
         place.parent.mkdir(parents=True, exist_ok=True)
 

@@ -24,16 +24,9 @@ class DaskProcesses:
     def __init__(self, folder: Path, *paths: Path, workers: int = 2) -> None:
         self.family = new_family()
         self.file = folder / "scheduler.json"
-        self.own = ("--no-dashboard", "--scheduler-file", str(self.file))
-        scheduler = (
-            "-m",
-            "distributed.cli.dask_scheduler",
-            "--host",
-            "127.0.0.1",
-            "--port",
-            "0",
-            *self.own,
-        )
+        place = ("--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0")
+        self.own = (*place, "--scheduler-file", str(self.file))
+        scheduler = ("-m", "distributed.cli.dask_scheduler", "--port", "0", *self.own)
         self.scheduler = start(self.family, *scheduler, paths=paths)
         try:
             wait_until(self._says_where)

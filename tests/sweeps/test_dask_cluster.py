@@ -3,8 +3,10 @@
 import signal
 import sys
 import threading
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
+import psutil
 import pytest
 
 from sweeps.engine import Cluster, run
@@ -31,6 +33,16 @@ def test_results_are_those_of_one_process(dask, tmp_path):
     assert "other sources, package versions" in done.pop(tasks[4].key).error
     for k in (0, 1, 3, 5, 6, 7):
         assert done[str(k)] == Done(str(k), k * k)
+
+
+def test_documented_options_listen_on_the_loopback_alone(dask):
+    page = (Path(__file__).parents[2] / "docs/sweeps.md").read_text(encoding="utf-8")
+    commands = [line for line in page.splitlines() if line.startswith(("dask sch", "dask work"))]
+    assert len(commands) == 4
+    assert all("--dashboard-address 127.0.0.1:" in command for command in commands)
+    found = [c for p in alive(dask.family) for c in p.net_connections("tcp")]
+    listening = {c.laddr.ip for c in found if c.status == psutil.CONN_LISTEN}
+    assert listening == {"127.0.0.1"}
 
 
 def test_killed_worker_loses_no_result(dask, tmp_path):
