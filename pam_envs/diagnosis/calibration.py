@@ -53,6 +53,10 @@ DISPLAY = {"contraction": ("mm", 1e-3), "pressure": ("bar", 1e5)}
 WIDTH = 100
 
 
+WITHOUT = {**SWITCHED_OFF, "muscle.braid_force": 0.0}
+"""Values at which a term of the plant is absent."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Errors:
     """RMS errors of a channel, in SI."""
@@ -320,7 +324,7 @@ def _bounds(
         if at_bound(free, value) and not (weight and value < LEAST_WEIGHT):
             f, unit = original.factor_of(plant, free.name), unit_of(plant, free.name)
             text = _at_bound(free.name, f * value, f * free.low, f * free.high, unit)
-            yield free.name, "" if value == SWITCHED_OFF.get(free.name) else text
+            yield free.name, "" if value == WITHOUT.get(free.name) else text
 
 
 def _at_bound(name: str, value: float, low: float, high: float, unit: str) -> str:

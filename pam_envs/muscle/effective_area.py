@@ -81,7 +81,7 @@ class EffectiveAreaMuscle(
     hardening: float = identified(8600.0, "N", -1e7, 1e7, _FIT)
     # a static map that has to be finer; neutral in the plain law
     area_curve: float = effect("1", -60.0, 60.0, "the area shrinks with strain squared too")
-    softening: float = effect("N", -1e6, 1e6, "passive force over strain squared")
+    softening: float = effect("N", -1e7, 1e7, "passive force over strain squared")
     stiffening: float = effect("N", -1e8, 1e8, "passive force over strain to the fourth")
 
     def tension(self, drive: ArrayLike, strain: ArrayLike) -> NDArray[np.float64]:

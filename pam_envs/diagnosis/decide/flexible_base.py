@@ -39,6 +39,10 @@ OBVIOUS = 0.4
 """Gain of a difference by a linear model above which it is kept without a refit."""
 NOISE_ONLY = 1.06
 """Mean square of the residual over the noise below which the base needs no difference."""
+SHOWN = 2.0
+"""Least distance of a parameter from the plain plant's value, over its standard deviation."""
+SPARSE_ROUNDS, SPARSE_LOSS = 4, 0.02
+"""Rounds of a fit without the others, and the gain that it may lose."""
 STARTS = 2
 """Number of starting values of each difference."""
 
@@ -204,11 +208,56 @@ class FlexibleBase:
         chosen = self.chosen([c for c in causes if c.common])
         if not chosen or self.fits():
             return self.base
-        model = self.needed(self.fitted(chosen))
+        model = self.sparse(self.needed(self.fitted(chosen)))
         if len(model.fit.frees) > len(self.base.fit.frees):
             model = refit(self.problem, self.blocks, model, 2)
         complete_jacobian(self.problem, model.fit)
         return model
+
+    def sparse(self, model: Candidate) -> Candidate:
+        """Return a model whose differences have the parameters that the recording shows.
+
+        Those within :data:`SHOWN` standard deviations of the plain plant take its values, one after
+        the other by a linear model of the residual.
+        """
+        complete_jacobian(self.problem, model.fit)
+        fit, neutral = model.fit, self.family.column
+        normal, _ = lsq.normal_equations(self.problem, fit)
+        known = {f.name for f in self.base.fit.frees}
+        with np.errstate(divide="ignore", invalid="ignore"):
+            plain = np.array([f.inner(neutral[f.place]) for f in fit.frees])
+        free = [k for k, f in enumerate(fit.frees) if f.name not in known and np.isfinite(plain[k])]
+        limit = SHOWN**2 * max(1.0, fit.cost / self.problem.sampled)
+        kept, z, spread = (
+            np.ones(len(plain), bool),
+            fit.z.copy(),
+            np.linalg.pinv(normal, hermitian=True),
+        )
+        while free:
+            off = z[free] - plain[free]
+            worse = off**2 / np.maximum(np.diag(spread)[free], 1e-300)
+            least = int(np.argmin(worse))
+            if worse[least] > limit:
+                break
+            k = free.pop(least)
+            row = spread[k].copy()
+            z = z - row / row[k] * off[least]
+            spread = spread - np.outer(row, row) / row[k]
+            kept[k] = False
+        if kept.all():
+            return model
+        column = fit.column.copy()
+        for k in np.flatnonzero(~kept):
+            column[fit.frees[k].place] = neutral[fit.frees[k].place]
+        frees = tuple(f for f, k in zip(fit.frees, kept, strict=True) if k)
+        inside = np.array([np.clip(v, *f.span) for f, v in zip(frees, z[kept], strict=True)])
+        less = restarted(fit, frees=frees, z=inside, column=column, shared=None)
+        less.take(fit.slopes[kept])
+        lsq.evaluate(self.problem, [less])
+        lsq.improve(self.problem, [less], SPARSE_ROUNDS, 1e-4)
+        errors = self.blocks.errors(self.problem.rows(less.residual))
+        smaller = Candidate(model.causes, less, errors)
+        return smaller if self.blocks.gain(smaller.errors, model.errors) < SPARSE_LOSS else model
 
     def fits(self) -> bool:
         """Return whether the base leaves hardly more than noise on every channel."""

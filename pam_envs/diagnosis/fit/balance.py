@@ -5,39 +5,42 @@ outputs. Errors of force are weighed by the compliance, so that the regression m
 contraction. The result only starts a fit, since the regressors contain noise.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebval
 from scipy.ndimage import uniform_filter1d
-from scipy.optimize import lsq_linear
+from scipy.optimize import isotonic_regression, lsq_linear
 
 from pam_envs.arrays import Array, Indices
 from pam_envs.constants import GRAVITY
-from pam_envs.diagnosis.fit.single_muscle import MuscleFamily
+from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, map_of
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.kernels.build import entry
 from pam_envs.kernels.yielding import deflected
 from pam_envs.muscle.effective_area import MAP_SIZES
-from pam_envs.muscle.effects import BREAKS, MAP_TERMS
+from pam_envs.muscle.effects import BREAKS
 
 SLOW = 0.008  # speed [m/s] below which a sample is an equilibrium of forces
+REVERSAL = 3.0  # least reversal of the smoothed path, over the noise
 FEWEST, MOST = 200, 4000  # least and largest number of samples
 ROUNDS = 4
 USUAL_STIFF = 2000.0  # stiffness over strain [N] of the first weights
 LEAST_STIFF = 0.15  # least stiffness of a weight, over the median
-BREAKS_IN_LENGTH, GROWTHS = (0.003, 0.01, 0.03, 0.09), (0.0, 4e-6, 1.5e-5)
+STIFF_SPREAD = 0.5  # standard deviation of the stiffness, over that of the plain law
+BREAKS_IN_LENGTH, GROWTHS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.09), (0.0, 1e-6, 4e-6, 1.5e-5)
 """Tried strains over which friction of the length builds up, and its growths with pressure
 [1/Pa]."""
+NEAR = (0.6, 0.77, 1.0, 1.3, 1.6)
+"""Factors on the break, and on the growth, of a chosen friction that are tried next."""
 BRAIDS = (0.008, 0.015, 0.06)
 """Tried strains over which the resistance of the braid falls."""
-BREAKS_IN_PRESSURE = (1e4, 3e4, 1e5)
+BREAKS_IN_PRESSURE = (1e4, 2e4, 4e4, 1e5)
 """Tried pressures over which friction of the pressure yields [Pa]."""
-RATIOS = (0.0, 1.0)
-"""Tried ratios of yielding elements: springs back, friction of Dahl."""
+RATIOS, RATIOS_NEAR = (0.0, 1.0), (0.0, 0.5, 1.0)
+"""Tried ratios of yielding elements, from springs back to the friction of Dahl."""
 LEAST_GAIN = 0.03
 """Relative decrease of the squared error that a further friction needs."""
 MAP_PRIOR = 20.0
@@ -71,11 +74,42 @@ def yielding(path: Array, span: Array, ratio: float, made: Array) -> None:
         made[k] = deflected(made[k - 1], path[k] - path[k - 1], span[k], ratio)[0]
 
 
+@entry
+def turning(path: Array, least: float, turns: Array) -> None:
+    """Mark the samples (T,) at which a path turns by at least ``least``."""
+    top = bottom = 0
+    way = 0
+    for k in range(len(path)):
+        if path[k] > path[top]:
+            top = k
+        if path[k] < path[bottom]:
+            bottom = k
+        if way >= 0 and path[k] < path[top] - least:
+            turns[top], way, bottom = 1.0, -1, k
+        elif way <= 0 and path[k] > path[bottom] + least:
+            turns[bottom], way, top = 1.0, 1, k
+
+
+def without_jitter(path: Array, least: float) -> Array:
+    """Return a path (T,), made monotonic between reversals of at least ``least``.
+
+    Along the jitter of a reading, friction that yields would relax.
+    """
+    turns = np.zeros(len(path))
+    turning(path, least, turns)
+    made, inner = path.copy(), np.flatnonzero(turns[1:-1]) + 1
+    for start, end in pairwise([0, *inner, len(path)]):
+        part = path[start:end]
+        made[start:end] = isotonic_regression(part, increasing=bool(part[-1] >= part[0])).x
+    return made
+
+
 @dataclass(frozen=True)
 class Friction:
     """Friction with a given course, which a regression may add."""
 
     kind: str
+    course: tuple[float, float, float]  # break, growth with pressure [1/Pa], ratio
     columns: Array  # (k, n): forces against the motion per coefficient
     names: tuple[str, ...]  # of the coefficients, (k,)
     fixed: dict[str, float]  # other parameters
@@ -111,10 +145,10 @@ class Balance:
     def of(
         cls, family: MuscleFamily, contraction: Array, pressure: Array, noise: float
     ) -> "Balance | None":
-        """Return the slow samples, and the braid that fits them best; None if they are too few.
+        """Return the slow samples; None if they are too few.
 
         ``contraction`` (T,) are readings [m], NaN where there is none, ``pressure`` (T,) is
-        simulated [Pa].
+        simulated or smoothed [Pa].
         """
         plant, load, period = family.plant, family.inputs.load, family.inputs.period
         usable = np.isfinite(contraction)
@@ -122,7 +156,7 @@ class Balance:
         contraction = contraction + float(below)  # relative to the unloaded rest length
         window = max(3, round(0.1 / period))
         known = np.interp(np.arange(len(load)), np.flatnonzero(usable), contraction[usable])
-        smooth = uniform_filter1d(known, window)
+        smooth = without_jitter(uniform_filter1d(known, window), REVERSAL * noise)
         speed = np.gradient(smooth, period)
         rows = np.flatnonzero(usable & (uniform_filter1d(np.abs(speed), window) < SLOW))
         if len(rows) < FEWEST:
@@ -134,11 +168,15 @@ class Balance:
         path, force = smooth / plant.muscle.rest_length, load[rows] * GRAVITY
         speed = (speed / plant.muscle.rest_length)[rows]
         near = path[rows], pressure[rows], force, gaps, speed
-        made = cls(family, rows, *near, path, pressure, noise, plant.muscle.braid_strain)
-        other = (replace(made, braid=strain) for strain in BRAIDS)
-        best = min(other, key=lambda balance: balance._finer[0].error)
-        helps = best._finer[0].error < (1.0 - LEAST_GAIN) * made._finer[0].error
-        return best if helps else made
+        return cls(family, rows, *near, path, pressure, noise, plant.muscle.braid_strain)
+
+    def with_best_braid(self) -> "Balance":
+        """Return the samples with the braid that fits them best."""
+        frictions = self._finer[1]
+        errors = {b: replace(self, braid=b)._regressed(frictions).error for b in BRAIDS}
+        best = min(errors, key=lambda braid: errors[braid])
+        helps = errors[best] < (1.0 - LEAST_GAIN) * self._finer[0].error
+        return replace(self, braid=best) if helps else self
 
     def solve(self) -> dict[str, float]:
         """Return coefficients of the static law and play weights."""
@@ -162,37 +200,72 @@ class Balance:
 
         Friction of each kind is added as long as it helps: strands and yielding elements.
         """
-        _, taper, stiff = self._plain
-        maps, tried = self._terms(), list(self._frictions(taper))
-        always = [self._law(), self._plays(taper), self._late(stiff), maps]
-        columns = np.vstack([*always, *(f.columns for f in tried)])
-        regression = _Regression(columns, self.force, self._weights(stiff))
-        first = sum(len(part) for part in always)
+        chosen = self._chosen(self._frictions())
+        nearer = [friction for one in chosen for friction in self._near(one)]
+        chosen = self._chosen(nearer) if nearer else []
+        return self._regressed(chosen), chosen
+
+    def _chosen(self, tried: Iterable[Friction]) -> list[Friction]:
+        """Return the friction that reduces the error, at most one of each kind."""
+        tried = list(tried)
+        regression, first, low, precision = self._whole(tried)
         ends = np.cumsum([first, *(len(f.columns) for f in tried)])
-        precision = np.zeros(len(columns))
-        precision[first - len(maps) : first] = MAP_PRIOR**-2
-        low = np.zeros(len(columns))
-        low[:first] = np.append(self._lowest(), np.full(len(maps), -np.inf))
         chosen: list[int] = []
 
-        def places(of: list[int]) -> Indices:
-            """Return the columns of the law, the map and some kinds of friction."""
+        def error(of: list[int]) -> float:
+            """Return the squared error with some friction."""
             parts = [np.arange(ends[k], ends[k + 1]) for k in of]
-            return np.concatenate([np.arange(first), *parts])
+            return regression.solve(
+                np.concatenate([np.arange(first), *parts]), low, precision
+            ).error
 
-        best = regression.solve(places(chosen), low, precision)
+        best = error(chosen)
         while True:
             used = {tried[k].kind for k in chosen}
-            further = [k for k, f in enumerate(tried) if f.kind not in used]
-            solved = {k: regression.solve(places([*chosen, k]), low, precision) for k in further}
-            if not solved:
-                break
-            least = min(solved, key=lambda k: solved[k].error)
-            if solved[least].error > (1.0 - LEAST_GAIN) * best.error:
-                break
+            errors = {k: error([*chosen, k]) for k, f in enumerate(tried) if f.kind not in used}
+            least = min(errors, key=lambda k: errors[k], default=None)
+            if least is None or errors[least] > (1.0 - LEAST_GAIN) * best:
+                return [tried[k] for k in chosen]
             chosen.append(least)
-            best = solved[least]
-        return best, [tried[k] for k in chosen]
+            best = errors[least]
+
+    def _regressed(self, frictions: list[Friction]) -> Solution:
+        """Return the solution with some friction."""
+        regression, _, low, precision = self._whole(frictions)
+        return regression.solve(np.arange(len(low)), low, precision)
+
+    def _whole(self, frictions: list[Friction]) -> tuple["_Regression", int, Array, Array]:
+        """Return the regression on law, map and friction, with the settings of its solution.
+
+        These are the number of columns before friction, the least coefficients and the precisions.
+        """
+        _, taper, stiff = self._plain
+        maps = self._terms()
+        always = np.vstack([self._law(), self._plays(taper), self._late(stiff), maps])
+        columns = np.vstack([always, *(f.columns for f in frictions)])
+        precision, low = np.zeros(len(columns)), np.zeros(len(columns))
+        precision[len(always) - len(maps) : len(always)] = MAP_PRIOR**-2
+        low[: len(always)] = np.append(self._lowest(), np.full(len(maps), -np.inf))
+        regression = _Regression(columns, self.force, self._weights(stiff), self._stiff(stiff))
+        return regression, len(always), low, precision
+
+    def _stiff(self, stiff: Array) -> Array:
+        """Return rows of a regression that keep the stiffness near that of the plain law.
+
+        Readings under few loads alone are explained just as well by a law without stiffness.
+        One row for each column of law, plays, lateness and map, and one for the target, (k + 1, m).
+        """
+        some = np.arange(0, len(self.rows), max(1, len(self.rows) // FEWEST))
+        e, p = self.strain[some], self.pressure[some]
+        one, none = np.ones(len(some)), np.zeros(len(some))
+        bend = np.exp(-e / self.braid) / self.braid
+        slopes = [none, p, 2.0 * e * p, bend, one, 2.0 * e, 3.0 * e**2, 4.0 * e**3]
+        slopes += [none] * (len(self.gaps) + 2)
+        slopes += list(-map_of(self.family.plant.muscle, p, e)[2])
+        floor = LEAST_STIFF * float(np.median(stiff))
+        wanted = np.maximum(stiff[some], floor)
+        weight = np.sqrt(len(self.rows) / len(some)) / (STIFF_SPREAD * wanted)
+        return np.array([*slopes, wanted]) * weight
 
     def flexible(self) -> dict[str, float]:
         """Return coefficients with the map and with further friction."""
@@ -211,33 +284,63 @@ class Balance:
             found["hysteresis.yield_width"] /= found["muscle.area"]
         return found
 
-    def _frictions(self, taper: Array) -> Iterator[Friction]:
+    def _frictions(self) -> Iterator[Friction]:
         """Yield friction with all tried courses."""
-        made = np.empty(len(self.path))
         for away, growth in product(BREAKS_IN_LENGTH, GROWTHS):
-            span, columns = away * (1.0 + growth * self.drive), []
-            for part in BREAKS:
-                slipping(self.path, part * span, made)
-                columns.append(made[self.rows] / (part * away))
-            names = tuple(f"muscle.strand_{k + 1}" for k in range(len(BREAKS)))
-            fixed = {"muscle.strand_break": away, "muscle.strand_per_pressure": growth}
-            yield Friction("strands", -np.array(columns), names, fixed)
+            yield self._strands(away, growth)
             for ratio in RATIOS:
-                yielding(self.path, span, ratio, made)
-                name = "muscle.yield_"
-                yield Friction(
-                    "length",
-                    -made[None, self.rows] / away,
-                    (f"{name}force",),
-                    {f"{name}break": away, f"{name}ratio": ratio},
-                    f"{name}per_pressure",
-                    growth,
-                )
+                yield self._in_length(away, growth, ratio)
         for away, ratio in product(BREAKS_IN_PRESSURE, RATIOS):
-            yielding(self.drive, np.full(len(self.drive), away), ratio, made)
-            fixed = {"hysteresis.yield_break": away, "hysteresis.yield_ratio": ratio}
-            column = -made[None, self.rows] / away * (1.0 - taper)
-            yield Friction("pressure", column, ("hysteresis.yield_width",), fixed)
+            yield self._in_pressure(away, ratio)
+
+    def _near(self, friction: Friction) -> Iterator[Friction]:
+        """Yield friction of one kind with similar courses."""
+        away, growth, ratio = friction.course
+        for nearer in (factor * away for factor in NEAR):
+            if friction.kind == "pressure":
+                for other in sorted({ratio, *RATIOS_NEAR}):
+                    yield self._in_pressure(nearer, other)
+                continue
+            for slower in (factor * growth for factor in (NEAR if growth else (0.0,))):
+                if friction.kind == "strands":
+                    yield self._strands(nearer, slower)
+                else:
+                    for other in sorted({ratio, *RATIOS_NEAR}):
+                        yield self._in_length(nearer, slower, other)
+
+    def _strands(self, away: float, growth: float) -> Friction:
+        """Return Maxwell elements that break away over a strain, with growth by pressure [1/Pa]."""
+        span, columns, made = away * (1.0 + growth * self.drive), [], np.empty(len(self.path))
+        for part in BREAKS:
+            slipping(self.path, part * span, made)
+            columns.append(made[self.rows] / (part * away))
+        names = tuple(f"muscle.strand_{k + 1}" for k in range(len(BREAKS)))
+        fixed = {"muscle.strand_break": away, "muscle.strand_per_pressure": growth}
+        return Friction("strands", (away, growth, 0.0), -np.array(columns), names, fixed)
+
+    def _in_length(self, away: float, growth: float, ratio: float) -> Friction:
+        """Return an element that yields over a strain, with growth by pressure [1/Pa]."""
+        made = np.empty(len(self.path))
+        yielding(self.path, away * (1.0 + growth * self.drive), ratio, made)
+        name = "muscle.yield_"
+        return Friction(
+            "length",
+            (away, growth, ratio),
+            -made[None, self.rows] / away,
+            (f"{name}force",),
+            {f"{name}break": away, f"{name}ratio": ratio},
+            f"{name}per_pressure",
+            growth,
+        )
+
+    def _in_pressure(self, away: float, ratio: float) -> Friction:
+        """Return an element that yields over a pressure [Pa]."""
+        made = np.empty(len(self.drive))
+        yielding(self.drive, np.full(len(self.drive), away), ratio, made)
+        fixed = {"hysteresis.yield_break": away, "hysteresis.yield_ratio": ratio}
+        column = -made[None, self.rows] / away * (1.0 - self._plain[1])
+        names = ("hysteresis.yield_width",)
+        return Friction("pressure", (away, 0.0, ratio), column, names, fixed)
 
     def _law(self) -> Array:
         """Return the terms of the static law, in the order of :data:`LAW`, (terms, n)."""
@@ -255,10 +358,7 @@ class Balance:
 
     def _terms(self) -> Array:
         """Return the terms of the map, (terms, n)."""
-        law, eye = self.family.plant.muscle, np.eye(6)
-        u = np.clip(2.0 * self.pressure / law.map_pressure - 1.0, -1.0, 1.0)
-        s = np.clip(2.0 * self.strain / law.map_strain - 1.0, -1.0, 1.0)
-        return np.array([chebval(u, eye[i]) * chebval(s, eye[j]) for i, j in MAP_TERMS])
+        return map_of(self.family.plant.muscle, self.pressure, self.strain)[0]
 
     def _lowest(self) -> Array:
         """Return the least coefficients of law, plays and lateness."""
@@ -300,9 +400,20 @@ class Balance:
 class _Regression:
     """Least squares on columns with bounds, for many choices of them."""
 
-    def __init__(self, columns: Array, target: Array, weights: Array) -> None:
+    def __init__(
+        self, columns: Array, target: Array, weights: Array, others: Array | None = None
+    ) -> None:
+        """Take columns (k, n), target and weights (n,), and further weighted rows (j + 1, m).
+
+        These hold the first ``j`` columns and the target.
+        """
         self.scale = np.linalg.norm(columns * weights, axis=1) + 1e-12
         whole = np.vstack([columns / self.scale[:, None], target]) * weights
+        if others is not None:
+            more, j = np.zeros((len(whole), others.shape[1])), len(others) - 1
+            more[:j] = others[:-1] / self.scale[:j, None]
+            more[-1] = others[-1]
+            whole = np.hstack([whole, more])
         upper = np.asarray(np.linalg.qr(whole.T, mode="r"))
         self.matrix, self.target = upper[:, :-1], upper[:, -1]
 

@@ -1,10 +1,11 @@
 """Calibration of the plant's base parameters, so that wrong values are not taken for effects."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from pam_envs.arrays import Array
 from pam_envs.diagnosis.cause import Form
@@ -35,7 +36,8 @@ from pam_envs.pneumatics.flow import REPLACED
 
 FAST = 0.04  # lag [s] below which the replay takes finer steps
 FINE_STEP = 0.0101
-GUESS_ROUNDS, ROUNDS = 6, 10
+GUESS_ROUNDS, FLOW_ROUNDS, ROUNDS = 6, 12, 10
+SMOOTH = 0.1  # window [s] over which measured pressures are averaged
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,9 +62,10 @@ def calibrate(
 ) -> Calibration:
     """Fit the base of a plant.
 
-    The regulator is fitted first, to the pressure alone, in several orders; then the static map
-    and the friction by a regression of the force balance; then all parameters by simulation, from
-    that guess and from the given plant. ``measured`` (channels, T) is NaN where there is no
+    The regulator is fitted first, to the pressure alone, in several orders, with a muscle from a
+    regression of the force balance on the measured pressure; then the static map and the friction
+    by the same regression on the simulated pressure; then all parameters by simulation, from that
+    guess and from the given plant. ``measured`` (channels, T) is NaN where there is no
     reading, ``noise`` is its RMS (channels,), ``shapes`` those of :class:`Problem`; ``rates`` are
     the forms of a limited rate that the regulator may have.
     """
@@ -83,8 +86,14 @@ def calibrate(
     )
     column, rate = family.column, None
     found: dict[str, float] = {}
+    plays = family.plant.hysteresis.model.kind == PlayOperator.kind
+    moved = np.isfinite(measured[0]).any() and plays
     if np.isfinite(measured[1]).any():
-        family, fit = regulator(problem, family, blocks, rates)
+        rough: dict[str, float] = {}
+        if moved:
+            balance = Balance.of(family, measured[0], smoothed(pressure, time), noise[0])
+            rough = balance.solve() if balance is not None else {}
+        family, fit = regulator(problem, family, blocks, rates, rough)
         found |= fit.values()
         rate = next((r for r in rates if all(t.name in found for t in r.terms)), None)
         if family.plant.air == "regulator" and found[LAG] < FAST:
@@ -95,20 +104,33 @@ def calibrate(
     tried: list[tuple[Free, ...]] = [frees]
     law: dict[str, float] = {}
     wide: dict[str, float] = {}
-    plays = family.plant.hysteresis.model.kind == PlayOperator.kind
-    if np.isfinite(measured[0]).any() and plays:
+    if moved:
         pressure = family.simulate(column[None])[1, :, 0]
-        slow = Balance.of(family, measured[0], pressure, noise[0])
-        if slow is not None:
-            law, wide = slow.solve(), slow.flexible()
-            plant = family.plant.replace({"muscle.braid_strain": slow.braid})
-            family = dataclasses.replace(family, plant=plant)
-            problem = replayed_by(family, problem)
+        balance = Balance.of(family, measured[0], pressure, noise[0])
+        if balance is not None:
+            balance = balance.with_best_braid()
+            law, wide = balance.solve(), balance.flexible()
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column
     best = fit_base(problem, blocks, plain, tried, ROUNDS)
     return Calibration(family, problem, best, found | law | wide, rate)
+
+
+def smoothed(pressure: Array, time: Array) -> Array:
+    """Return measured pressures (T,) without the fast part of their noise."""
+    window = max(1, round(SMOOTH / float(time[1] - time[0])))
+    return np.asarray(uniform_filter1d(pressure, window))
+
+
+def column_with(family: MuscleFamily, law: Mapping[str, float]) -> Array:
+    """Return the column of a family with a static law and play weights, within their bounds."""
+    column = family.column
+    for free in family.base():
+        if free.name in law:
+            column[free.place] = free.within(law[free.name])
+    family.tie(column[None])
+    return column
 
 
 def replayed_by(family: MuscleFamily, problem: Problem) -> Problem:
@@ -128,12 +150,17 @@ CONDUCTANCES = (1e-10, 8e-10)
 
 
 def regulator(
-    problem: Problem, family: MuscleFamily, blocks: Blocks, rates: Sequence[Form]
+    problem: Problem,
+    family: MuscleFamily,
+    blocks: Blocks,
+    rates: Sequence[Form],
+    law: Mapping[str, float],
 ) -> tuple[MuscleFamily, Fit]:
     """Return the plant with the regulator that the pressure needs, and its fit to the pressure.
 
-    First order or with a pilot stage, either with or without a limit of its rate (``rates``); or,
-    if it is clearly better, with flow through the orifices of a valve.
+    The muscle, whose volume is filled, has the coefficients of a ``law``. First order or with a
+    pilot stage, either with or without a limit of its rate (``rates``); or, if it is clearly
+    better, with flow through the orifices of a valve.
     """
     alone = problem.measured.copy()
     alone[0] = np.nan
@@ -146,7 +173,8 @@ def regulator(
     for form in rates:
         if not flows and not any(t.name in known for t in form.terms):
             limits += [frees_for(family, form, values) for values in form.starts]
-    fits = [Fit.at_start((*order, *limit), family.column) for order in orders for limit in limits]
+    column = column_with(family, law)
+    fits = [Fit.at_start((*order, *limit), column) for order in orders for limit in limits]
     only = dataclasses.replace(problem, measured=alone)
     chosen = _simplest(only, blocks, fits)
     if "regulator.pilot_lag" in chosen.values():
@@ -166,7 +194,8 @@ def regulator(
         )
     ]
     only = dataclasses.replace(only, simulate=other.simulate, tie=other.tie)
-    flow = _simplest(only, blocks, [Fit.at_start(frees, other.column) for frees in starts], 12)
+    column = column_with(other, law)
+    flow = _simplest(only, blocks, [Fit.at_start(frees, column) for frees in starts], FLOW_ROUNDS)
     if blocks.gain(before, blocks.errors(only.rows(flow.residual))) < FLOW_GAIN:
         return family, chosen
     return other, flow

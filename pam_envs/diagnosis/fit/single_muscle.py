@@ -43,6 +43,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "muscle.area_taper": {"scale": 0.1, "prior": 60.0},
     "muscle.area_curve": {"scale": 0.5, "prior": 60.0},
     "muscle.braid_force": {"scale": 5.0, "prior": 60.0},
+    "muscle.braid_strain": {"log": True, "prior": 1.0},
     "muscle.stiffness": {"scale": 100.0, "prior": 60.0},
     "muscle.softening": {"scale": 500.0, "prior": 60.0},
     "muscle.hardening": {"scale": 2e3, "prior": 60.0},
@@ -194,15 +195,8 @@ class MuscleFamily:
     @cached_property
     def _map_slopes(self) -> tuple[Array, Array]:
         """Derivatives of the map's terms by strain and pressure at the states, (terms, k)."""
-        law = self.plant.muscle
-        u = np.clip(2.0 * self.states[0] / law.map_pressure - 1.0, -1.0, 1.0)
-        s = np.clip(2.0 * self.states[1] / law.map_strain - 1.0, -1.0, 1.0)
-        eye = np.eye(6)
-        of = [chebval(u, eye[p]) for p, _ in MAP_TERMS]
-        by = [chebval(u, chebder(eye[p])) * 2.0 / law.map_pressure for p, _ in MAP_TERMS]
-        of_e = [chebval(s, eye[q]) for _, q in MAP_TERMS]
-        by_e = [chebval(s, chebder(eye[q])) * 2.0 / law.map_strain for _, q in MAP_TERMS]
-        return np.array(of) * np.array(by_e), np.array(by) * np.array(of_e)
+        _, by_pressure, by_strain = map_of(self.plant.muscle, *self.states)
+        return by_strain, by_pressure
 
     def free(self, name: str, **changes: Any) -> Free:
         """Return the fit settings of a parameter; ``changes`` override its declaration."""
@@ -258,6 +252,21 @@ class MuscleFamily:
                 operator.thresholds, weights, 1.0 - sum(weights)
             )
         return self.plant.replace_with_substeps(values)
+
+
+def map_of(law: Any, pressure: Array, strain: Array) -> tuple[Array, Array, Array]:
+    """Return the terms of a map at pressures [Pa] and strains (k,), and their derivatives by each.
+
+    Each has the shape (terms, k); beyond the range of the map they are those of its edge.
+    """
+    u = np.clip(2.0 * pressure / law.map_pressure - 1.0, -1.0, 1.0)
+    s = np.clip(2.0 * strain / law.map_strain - 1.0, -1.0, 1.0)
+    eye = np.eye(6)
+    of = np.array([chebval(u, eye[p]) for p, _ in MAP_TERMS])
+    by = np.array([chebval(u, chebder(eye[p])) * 2.0 / law.map_pressure for p, _ in MAP_TERMS])
+    of_e = np.array([chebval(s, eye[q]) for _, q in MAP_TERMS])
+    by_e = np.array([chebval(s, chebder(eye[q])) * 2.0 / law.map_strain for _, q in MAP_TERMS])
+    return of * of_e, by * of_e, of * by_e
 
 
 UNUSED_MAP = {

@@ -17,7 +17,6 @@ from pam_envs.diagnosis.fit.least_squares import Fit, PlantFamily, Problem, colu
 Starts = Sequence[tuple[float, ...]]
 
 EARLIEST = 0.03  # share of a record at either end without candidates for a step: there it is a bias
-SLOW = (30.0, 120.0)  # starting values of the duration of a slow drift [s]
 APART = 0.02  # least distance of two candidates, as a share of the record
 CANDIDATES = 2
 LEAST_PART = 0.02  # least factor on the amounts of a grid
@@ -72,12 +71,15 @@ def _taken(rows: Array, gram: Array) -> Array:
 step_starts.trials = 100  # type: ignore[attr-defined]
 
 
-def ramps(output: int) -> Callable[..., Starts]:
-    """Return a search for drifts about the best step: size [m], [Pa], middle, duration [s]."""
+def changes_of(output: int, durations: Sequence[float]) -> Callable[..., Starts]:
+    """Return a search for changes of a reading about the best step, from each of ``durations`` [s].
+
+    It gives size [m], [Pa], middle and duration [s].
+    """
 
     def starts(problem: Problem, family: PlantFamily, base: Fit, form: Any) -> Starts:
         found = step_starts(problem, family, base, form, output)[:1]
-        return [(size, middle, slow) for size, middle in found for slow in SLOW]
+        return [(size, middle, over) for size, middle in found for over in durations]
 
     starts.trials = 200  # type: ignore[attr-defined]
     return starts

@@ -1,16 +1,29 @@
 """Sensor bias: a reading is off by a constant.
 
 The zero of an amplifier, or a muscle that was not at rest when the sensor was zeroed, shifts every
-reading by the same amount at all pressures and loads. An amplifier that was just switched on needs
-some seconds to reach its bias. Only the reading is affected.
+reading by the same amount at all pressures and loads. An amplifier that was just switched on, or
+whose supply changes, reaches its bias within :data:`LONGEST`; a slower change is a drift. Only the
+reading is affected.
 """
 
+from collections.abc import Callable
+
 from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.fit.starting_values import Starts, changes_of
+
+LONGEST = 40.0
+"""Time [s] within which a reading reaches its bias."""
 
 
 def _warming_up(name: str, sensor: str, size: float) -> Form:
-    end = Term(f"{sensor}.drift_time", (2.0,), low=1.0, high=8.0, log=True, amount=False)
+    end = Term(f"{sensor}.drift_time", (2.0, 20.0), low=1.0, high=LONGEST, log=True, amount=False)
     return Form(name, (Term(f"{sensor}.drift", (size,), scale=size), end))
+
+
+def _appearing(name: str, sensor: str, size: float, search: Callable[..., Starts]) -> Form:
+    middle = Term(f"{sensor}.ramp_at", (100.0,), scale=2.0, amount=False)
+    end = Term(f"{sensor}.ramp_over", (5.0,), low=1.0, high=LONGEST, log=True, amount=False)
+    return Form(name, (Term(f"{sensor}.ramp", (size,), scale=size), middle, end), search)
 
 
 CAUSE = Cause(
@@ -26,8 +39,11 @@ CAUSE = Cause(
         ),
         _warming_up("warming up", "position", 1e-4),
         _warming_up("warming up, pressure", "pressure", 1e3),
+        _appearing("appearing", "position", 1e-4, changes_of(0, (4.0, 25.0))),
+        _appearing("appearing, pressure", "pressure", 1e3, changes_of(1, (4.0, 25.0))),
     ),
-    signature="the same error at all times, at rest without pressure too",
+    contains=("slip_step",),
+    signature="the same error at all times from a moment on, at rest without pressure too",
     neighbours=(
         "sensor_drift",
         "sensor_nonlinearity",

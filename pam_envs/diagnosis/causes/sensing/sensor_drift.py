@@ -2,23 +2,27 @@
 
 Electronics warm up, a clamp or a coating settles, a bridge amplifier follows the room temperature.
 The error depends on time alone, not on the muscle: it settles exponentially, or changes between two
-moments and then is constant.
+moments and then is constant. A change within :data:`~.sensor_bias.LONGEST` is a bias.
 """
 
 from collections.abc import Callable
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
-from pam_envs.diagnosis.fit.starting_values import Starts, ramps
+from pam_envs.diagnosis.causes.sensing.sensor_bias import LONGEST
+from pam_envs.diagnosis.fit.starting_values import Starts, changes_of
+
+SLOW = (50.0, 150.0)
+"""Starting values of the duration of a slow change [s]."""
 
 
 def _settling(sensor: str, size: float, time: float) -> Form:
-    end = Term(f"{sensor}.drift_time", (time,), low=10.0, log=True, amount=False)
+    end = Term(f"{sensor}.drift_time", (time,), low=LONGEST, log=True, amount=False)
     return Form(sensor, (Term(f"{sensor}.drift", (size,), scale=size), end))
 
 
 def _ramp(name: str, sensor: str, size: float, search: Callable[..., Starts]) -> Form:
     start = Term(f"{sensor}.ramp_at", (100.0,), scale=20.0, amount=False)
-    duration = Term(f"{sensor}.ramp_over", (60.0,), low=15.0, log=True, amount=False)
+    duration = Term(f"{sensor}.ramp_over", (60.0,), low=LONGEST, log=True, amount=False)
     return Form(name, (Term(f"{sensor}.ramp", (size,), scale=size), start, duration), search)
 
 
@@ -27,9 +31,9 @@ CAUSE = Cause(
     title="a drifting sensor",
     forms=(
         _settling("position", 1e-6, 60.0),
-        _ramp("ramp", "position", 1e-4, ramps(0)),
+        _ramp("ramp", "position", 1e-4, changes_of(0, SLOW)),
         _settling("pressure", 10.0, 1000.0),
-        _ramp("pressure ramp", "pressure", 1e3, ramps(1)),
+        _ramp("pressure ramp", "pressure", 1e3, changes_of(1, SLOW)),
     ),
     signature="a slow function of time, equal at rest and under pressure, on one output only",
     contains=("sensor_bias", "slip_step"),
