@@ -125,7 +125,7 @@ class FlexibleBase:
             )
             z = np.concatenate([begin, [f.inner(f.within(f.start)) for f in frees]])
             fits.append(restarted(plain, frees=(*plain.frees, *frees), z=z, shared=None))
-        lsq.evaluate(self.problem, fits)
+        fits = lsq.promising(self.problem, fits)
         lsq.improve(self.problem, fits, 2, 1e-4, lsq.FEW_DAMPINGS)
         best = min(fits, key=lambda f: f.cost)
         lsq.improve(self.problem, [best], ROUNDS, 1e-3)
@@ -247,8 +247,8 @@ class FlexibleBase:
         if kept.all():
             return model
         column = fit.column.copy()
-        for k in np.flatnonzero(~kept):
-            column[fit.frees[k].place] = neutral[fit.frees[k].place]
+        for gone in np.flatnonzero(~kept):
+            column[fit.frees[gone].place] = neutral[fit.frees[gone].place]
         frees = tuple(f for f, k in zip(fit.frees, kept, strict=True) if k)
         inside = np.array([np.clip(v, *f.span) for f, v in zip(frees, z[kept], strict=True)])
         less = restarted(fit, frees=frees, z=inside, column=column, shared=None)

@@ -29,7 +29,9 @@ FEWEST, MOST = 200, 4000  # least and largest number of samples
 ROUNDS = 4
 USUAL_STIFF = 2000.0  # stiffness over strain [N] of the first weights
 LEAST_STIFF = 0.15  # least stiffness of a weight, over the median
-STIFF_SPREAD = 0.5  # standard deviation of the stiffness, over that of the plain law
+STIFF_SPREAD, STATE_SPREAD = 0.5, 0.5
+"""Standard deviations of stiffness and slope, over those of the plain law: on average over all
+samples, and at each of the states at which a fit checks them."""
 BREAKS_IN_LENGTH, GROWTHS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.09), (0.0, 1e-6, 4e-6, 1.5e-5)
 """Tried strains over which friction of the length builds up, and its growths with pressure
 [1/Pa]."""
@@ -55,6 +57,8 @@ LAW = (
     "muscle.hardening",
     "muscle.stiffening",
 )
+PER_AREA = ("muscle.area_taper", "muscle.area_curve")
+"""Terms of the law whose coefficient is in proportion to the area."""
 
 
 @entry
@@ -186,12 +190,14 @@ class Balance:
     def _plain(self) -> tuple[Solution, Array, Array]:
         """Solution of law and plays, with its taper and its stiffness over strain [N], (n,)."""
         taper, stiff = np.zeros(len(self.strain)), np.full(len(self.strain), USUAL_STIFF)
+        area = self.family.plant.muscle.area
         for _ in range(ROUNDS):
             columns = np.vstack([self._law(), self._plays(taper), self._late(stiff)])
-            found = _Regression(columns, self.force, self._weights(stiff)).solve(
-                np.arange(len(columns)), self._lowest(), np.zeros(len(columns))
-            )
+            limits = self._limits(area, len(columns))
+            regression = _Regression(columns, self.force, self._weights(stiff), limits)
+            found = regression.solve(np.arange(len(columns)))
             taper, stiff = self._slopes(found.coefficients)
+            area = max(found.coefficients[0], 1e-6)
         return found, taper, stiff
 
     @cached_property
@@ -208,16 +214,14 @@ class Balance:
     def _chosen(self, tried: Iterable[Friction]) -> list[Friction]:
         """Return the friction that reduces the error, at most one of each kind."""
         tried = list(tried)
-        regression, first, low, precision = self._whole(tried)
+        regression, first = self._whole(tried)
         ends = np.cumsum([first, *(len(f.columns) for f in tried)])
         chosen: list[int] = []
 
         def error(of: list[int]) -> float:
             """Return the squared error with some friction."""
             parts = [np.arange(ends[k], ends[k + 1]) for k in of]
-            return regression.solve(
-                np.concatenate([np.arange(first), *parts]), low, precision
-            ).error
+            return regression.solve(np.concatenate([np.arange(first), *parts])).error
 
         best = error(chosen)
         while True:
@@ -231,41 +235,51 @@ class Balance:
 
     def _regressed(self, frictions: list[Friction]) -> Solution:
         """Return the solution with some friction."""
-        regression, _, low, precision = self._whole(frictions)
-        return regression.solve(np.arange(len(low)), low, precision)
+        regression, _ = self._whole(frictions)
+        return regression.solve(np.arange(len(regression.scale)))
 
-    def _whole(self, frictions: list[Friction]) -> tuple["_Regression", int, Array, Array]:
-        """Return the regression on law, map and friction, with the settings of its solution.
+    def _whole(self, frictions: list[Friction]) -> tuple["_Regression", int]:
+        """Return the regression on law, map and friction, and the columns before friction."""
+        found, taper, stiff = self._plain
+        always = [self._law(), self._plays(taper), self._late(stiff), self._terms()]
+        columns = np.vstack([*always, *(f.columns for f in frictions)])
+        limits = self._limits(max(found.coefficients[0], 1e-6), len(columns))
+        first = sum(map(len, always))
+        terms = slice(first - len(always[-1]), first)
+        limits.low[terms], limits.precision[terms] = -np.inf, MAP_PRIOR**-2
+        rows = self._weights(stiff), limits, self._kept()
+        return _Regression(columns, self.force, *rows), first
 
-        These are the number of columns before friction, the least coefficients and the precisions.
-        """
-        _, taper, stiff = self._plain
-        maps = self._terms()
-        always = np.vstack([self._law(), self._plays(taper), self._late(stiff), maps])
-        columns = np.vstack([always, *(f.columns for f in frictions)])
-        precision, low = np.zeros(len(columns)), np.zeros(len(columns))
-        precision[len(always) - len(maps) : len(always)] = MAP_PRIOR**-2
-        low[: len(always)] = np.append(self._lowest(), np.full(len(maps), -np.inf))
-        regression = _Regression(columns, self.force, self._weights(stiff), self._stiff(stiff))
-        return regression, len(always), low, precision
+    def _kept(self) -> Array:
+        """Return rows of a regression that keep the law near the plain one.
 
-    def _stiff(self, stiff: Array) -> Array:
-        """Return rows of a regression that keep the stiffness near that of the plain law.
-
-        Readings under few loads alone are explained just as well by a law without stiffness.
-        One row for each column of law, plays, lateness and map, and one for the target, (k + 1, m).
+        Its stiffness at some samples, since readings under few loads alone are explained just as
+        well by a law without stiffness, and its stiffness and its slope by pressure where a fit
+        checks that they are positive. One row for each column of law, plays, lateness and map, and
+        one for the target, (k + 1, m).
         """
         some = np.arange(0, len(self.rows), max(1, len(self.rows) // FEWEST))
-        e, p = self.strain[some], self.pressure[some]
-        one, none = np.ones(len(some)), np.zeros(len(some))
+        at = self.pressure[some], self.strain[some]
+        spread = STIFF_SPREAD * np.sqrt(len(some) / len(self.rows))
+        stiff, _ = self._near_plain(*at, spread)
+        pressure, strain = self.family.states
+        return np.hstack([stiff, *self._near_plain(pressure, strain, STATE_SPREAD)])
+
+    def _near_plain(self, p: Array, e: Array, spread: float) -> tuple[Array, Array]:
+        """Return rows for stiffness and slope by pressure [m2] at pressures [Pa] and strains."""
+        c = self._plain[0].coefficients
+        one, none = np.ones(len(e)), np.zeros(len(e))
         bend = np.exp(-e / self.braid) / self.braid
-        slopes = [none, p, 2.0 * e * p, bend, one, 2.0 * e, 3.0 * e**2, 4.0 * e**3]
-        slopes += [none] * (len(self.gaps) + 2)
-        slopes += list(-map_of(self.family.plant.muscle, p, e)[2])
-        floor = LEAST_STIFF * float(np.median(stiff))
-        wanted = np.maximum(stiff[some], floor)
-        weight = np.sqrt(len(self.rows) / len(some)) / (STIFF_SPREAD * wanted)
-        return np.array([*slopes, wanted]) * weight
+        stiff = np.array([none, p, 2 * e * p, bend, one, 2 * e, 3 * e**2, 4 * e**3])
+        slope = np.array([one, -e, -(e**2), *[none] * 5])
+        other = np.zeros((len(self.gaps) + 2, len(e)))
+        _, by_pressure, by_strain = map_of(self.family.plant.muscle, p, e)
+        made = []
+        for law, terms in ((stiff, -by_strain), (slope, by_pressure)):
+            wanted = c[: len(LAW)] @ law
+            wanted = np.maximum(wanted, LEAST_STIFF * float(np.median(np.abs(wanted))))
+            made.append(np.vstack([law, other, terms, wanted]) / (spread * wanted))
+        return made[0], made[1]
 
     def flexible(self) -> dict[str, float]:
         """Return coefficients with the map and with further friction."""
@@ -360,12 +374,24 @@ class Balance:
         """Return the terms of the map, (terms, n)."""
         return map_of(self.family.plant.muscle, self.pressure, self.strain)[0]
 
-    def _lowest(self) -> Array:
-        """Return the least coefficients of law, plays and lateness."""
-        low = np.full(len(LAW) + len(self.gaps), -np.inf)
-        low[[0, 3]] = 0.0
-        low[len(LAW) :] = 0.0
-        return np.append(low, [-np.inf, -np.inf])
+    def _limits(self, area: float, columns: int) -> "Limits":
+        """Return the limits of coefficients: those that a fit has, near an ``area`` [m2]."""
+        n, count = len(LAW), len(self.gaps)
+        limits = Limits(
+            low=np.zeros(columns),
+            high=np.full(columns, np.inf),
+            centre=np.zeros(columns),
+            precision=np.zeros(columns),
+        )
+        limits.low[n + count : n + count + 2] = -np.inf  # lateness
+        for k, name in enumerate(LAW):
+            free = self.family.free(name)
+            factor = area if name in PER_AREA else 1.0
+            limits.low[k], limits.high[k] = factor * free.low, factor * free.high
+            if not free.log and np.isfinite(free.prior):
+                limits.centre[k] = factor * free.start
+                limits.precision[k] = (factor * free.scale * free.prior) ** -2
+        return limits
 
     def _weights(self, stiff: Array) -> Array:
         """Return the contraction by force, over the noise, (n,)."""
@@ -397,16 +423,32 @@ class Balance:
         return found | {f"hysteresis.weight[{k}]": float(v) / area for k, v in enumerate(plays)}
 
 
+@dataclass(frozen=True)
+class Limits:
+    """Limits of the coefficients of a regression, each of shape (k,)."""
+
+    low: Array
+    high: Array
+    centre: Array  # of a prior
+    precision: Array  # of the prior, over the variance of the target
+
+
 class _Regression:
     """Least squares on columns with bounds, for many choices of them."""
 
     def __init__(
-        self, columns: Array, target: Array, weights: Array, others: Array | None = None
+        self,
+        columns: Array,
+        target: Array,
+        weights: Array,
+        limits: Limits,
+        others: Array | None = None,
     ) -> None:
         """Take columns (k, n), target and weights (n,), and further weighted rows (j + 1, m).
 
         These hold the first ``j`` columns and the target.
         """
+        self.limits = limits
         self.scale = np.linalg.norm(columns * weights, axis=1) + 1e-12
         whole = np.vstack([columns / self.scale[:, None], target]) * weights
         if others is not None:
@@ -417,12 +459,13 @@ class _Regression:
         upper = np.asarray(np.linalg.qr(whole.T, mode="r"))
         self.matrix, self.target = upper[:, :-1], upper[:, -1]
 
-    def solve(self, places: Indices, low: Array, precision: Array) -> Solution:
-        """Return the coefficients of some columns, within lower bounds and with a prior."""
-        scale = self.scale[places]
-        prior = np.diag(np.sqrt(precision[places]) / scale)[precision[places] > 0.0]
-        matrix = np.vstack([self.matrix[:, places], prior])
-        target = np.append(self.target, np.zeros(len(prior)))
-        bounds = low[places] * scale, np.full(len(places), np.inf)
+    def solve(self, places: Indices) -> Solution:
+        """Return the coefficients of some columns, within their limits."""
+        scale, limits = self.scale[places], self.limits
+        roots = np.sqrt(limits.precision[places])
+        some = roots > 0.0
+        matrix = np.vstack([self.matrix[:, places], np.diag(roots / scale)[some]])
+        target = np.append(self.target, (roots * limits.centre[places])[some])
+        bounds = limits.low[places] * scale, limits.high[places] * scale
         solved = lsq_linear(matrix, target, bounds, method="bvls")
         return Solution(solved.x / scale, 2.0 * float(solved.cost))

@@ -14,12 +14,15 @@ from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base, frees_for
 from pam_envs.diagnosis.fit.least_squares import (
     FEW_DAMPINGS,
+    LANES,
     Fit,
     Free,
     Problem,
     column_of,
     evaluate,
     improve,
+    no_violations,
+    promising,
 )
 from pam_envs.diagnosis.fit.single_muscle import (
     CLOCK,
@@ -37,6 +40,7 @@ from pam_envs.pneumatics.flow import REPLACED
 FAST = 0.04  # lag [s] below which the replay takes finer steps
 FINE_STEP = 0.0101
 GUESS_ROUNDS, FLOW_ROUNDS, ROUNDS = 6, 12, 10
+DAMPING = "mass.damping"
 SMOOTH = 0.1  # window [s] over which measured pressures are averaged
 
 
@@ -62,10 +66,9 @@ def calibrate(
 ) -> Calibration:
     """Fit the base of a plant.
 
-    The regulator is fitted first, to the pressure alone, in several orders, with a muscle from a
-    regression of the force balance on the measured pressure; then the static map and the friction
-    by the same regression on the simulated pressure; then all parameters by simulation, from that
-    guess and from the given plant. ``measured`` (channels, T) is NaN where there is no
+    The regulator is fitted first, to the pressure alone, in several orders; then the static map
+    and the friction by a regression of the force balance; then all parameters by simulation, from
+    that guess and from the given plant. ``measured`` (channels, T) is NaN where there is no
     reading, ``noise`` is its RMS (channels,), ``shapes`` those of :class:`Problem`; ``rates`` are
     the forms of a limited rate that the regulator may have.
     """
@@ -89,11 +92,13 @@ def calibrate(
     plays = family.plant.hysteresis.model.kind == PlayOperator.kind
     moved = np.isfinite(measured[0]).any() and plays
     if np.isfinite(measured[1]).any():
-        rough: dict[str, float] = {}
-        if moved:
-            balance = Balance.of(family, measured[0], smoothed(pressure, time), noise[0])
-            rough = balance.solve() if balance is not None else {}
-        family, fit = regulator(problem, family, blocks, rates, rough)
+        family, fit = regulator(problem, family, blocks, rates)
+        if may_flow(problem, blocks, family, fit):
+            rough: dict[str, float] = {}
+            if moved:
+                balance = Balance.of(family, measured[0], smoothed(pressure, time), noise[0])
+                rough = balance.flexible() if balance is not None else {}
+            family, fit = orifices(problem, family, blocks, fit, rough)
         found |= fit.values()
         rate = next((r for r in rates if all(t.name in found for t in r.terms)), None)
         if family.plant.air == "regulator" and found[LAG] < FAST:
@@ -110,6 +115,7 @@ def calibrate(
         if balance is not None:
             balance = balance.with_best_braid()
             law, wide = balance.solve(), balance.flexible()
+            law[DAMPING] = best_damping(problem, column_with(family, found | law | wide), family)
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column
@@ -124,13 +130,22 @@ def smoothed(pressure: Array, time: Array) -> Array:
 
 
 def column_with(family: MuscleFamily, law: Mapping[str, float]) -> Array:
-    """Return the column of a family with a static law and play weights, within their bounds."""
+    """Return the column of a family with some parameters, within their bounds."""
     column = family.column
-    for free in family.base():
-        if free.name in law:
-            column[free.place] = free.within(law[free.name])
+    for name, value in law.items():
+        free = family.free(name)
+        column[free.place] = free.within(value)
     family.tie(column[None])
     return column
+
+
+def best_damping(problem: Problem, column: Array, family: MuscleFamily) -> float:
+    """Return the damping [N s/m] with which a column fits best: slow motion does not show it."""
+    free = family.free(DAMPING)
+    columns = np.tile(column, (LANES, 1))
+    columns[:, free.place] = np.geomspace(free.low, free.high, LANES)
+    left = problem.residuals(columns)[:, : problem.seen]
+    return float(columns[np.argmin(np.einsum("ki,ki->k", left, left)), free.place])
 
 
 def replayed_by(family: MuscleFamily, problem: Problem) -> Problem:
@@ -150,21 +165,13 @@ CONDUCTANCES = (1e-10, 8e-10)
 
 
 def regulator(
-    problem: Problem,
-    family: MuscleFamily,
-    blocks: Blocks,
-    rates: Sequence[Form],
-    law: Mapping[str, float],
+    problem: Problem, family: MuscleFamily, blocks: Blocks, rates: Sequence[Form]
 ) -> tuple[MuscleFamily, Fit]:
     """Return the plant with the regulator that the pressure needs, and its fit to the pressure.
 
-    The muscle, whose volume is filled, has the coefficients of a ``law``. First order or with a
-    pilot stage, either with or without a limit of its rate (``rates``); or, if it is clearly
-    better, with flow through the orifices of a valve.
+    First order or with a pilot stage, either with or without a limit of its rate (``rates``).
     """
-    alone = problem.measured.copy()
-    alone[0] = np.nan
-    lag = tuple(f for f in family.base() if f.name.startswith("regulator.") or f.name == CLOCK)
+    lag = regulator_of(family)
     known = {f.name for f in lag}
     second = (*lag, *(family.free(name, start=start) for name, start in PILOT.items()))
     flows = family.plant.air == "flow"
@@ -173,37 +180,61 @@ def regulator(
     for form in rates:
         if not flows and not any(t.name in known for t in form.terms):
             limits += [frees_for(family, form, values) for values in form.starts]
-    column = column_with(family, law)
-    fits = [Fit.at_start((*order, *limit), column) for order in orders for limit in limits]
-    only = dataclasses.replace(problem, measured=alone)
+    fits = [Fit.at_start((*order, *limit), family.column) for order in orders for limit in limits]
+    only = of_pressure(problem)
+    evaluate(only, fits)
     chosen = _simplest(only, blocks, fits)
     if "regulator.pilot_lag" in chosen.values():
         pilot = {name: chosen.values()[name] for name in PILOT}
         family = dataclasses.replace(family, plant=family.plant.replace(pilot))
-    before = blocks.errors(only.rows(chosen.residual))
-    if flows or not can_flow(family) or blocks.means(before)[1] < FITS:
-        return family, chosen
+    return family, chosen
+
+
+def regulator_of(family: MuscleFamily) -> tuple[Free, ...]:
+    """Return the free parameters of the regulator and the clock."""
+    every = family.base()
+    return tuple(f for f in every if f.name.startswith("regulator.") or f.name == CLOCK)
+
+
+def of_pressure(problem: Problem) -> Problem:
+    """Return the problem of fitting the pressure alone."""
+    alone = problem.measured.copy()
+    alone[0] = np.nan
+    return dataclasses.replace(problem, measured=alone, violations=no_violations, checks=0)
+
+
+def may_flow(problem: Problem, blocks: Blocks, family: MuscleFamily, fit: Fit) -> bool:
+    """Return whether flow through orifices may explain what a regulator leaves of the pressure."""
+    if family.plant.air == "flow" or not can_flow(family):
+        return False
+    left = blocks.errors(of_pressure(problem).rows(fit.residual))
+    return bool(blocks.means(left)[1] >= FITS)
+
+
+def orifices(
+    problem: Problem, family: MuscleFamily, blocks: Blocks, fit: Fit, law: Mapping[str, float]
+) -> tuple[MuscleFamily, Fit]:
+    """Return the plant with flow through orifices and its fit, if clearly better than a fit.
+
+    The muscle, whose volume is filled, is that of the family or one with the parameters ``law``.
+    """
     other = dataclasses.replace(family, plant=orifices_of(family.plant))
     full = family.plant.regulator.max_pressure
-    named = [f for f in other.base() if f.name.startswith("regulator.") or f.name == CLOCK]
-    starts = [
-        tuple(dataclasses.replace(f, start=begin.get(f.name, f.start)) for f in named)
-        for begin in (
-            {"regulator.conductance": size, "regulator.source_pressure": source}
-            for size, source in product(CONDUCTANCES, (1.05 * full, 1.5 * full))
-        )
-    ]
-    only = dataclasses.replace(only, simulate=other.simulate, tie=other.tie)
-    column = column_with(other, law)
-    flow = _simplest(only, blocks, [Fit.at_start(frees, column) for frees in starts], FLOW_ROUNDS)
+    fits = []
+    for size, source in product(CONDUCTANCES, (1.05 * full, 1.5 * full)):
+        begin = {"regulator.conductance": size, "regulator.source_pressure": source}
+        frees = start_at_guess(regulator_of(other), begin)
+        fits += [Fit.at_start(frees, column_with(other, known)) for known in ({}, law)]
+    only = dataclasses.replace(of_pressure(problem), simulate=other.simulate, tie=other.tie)
+    flow = _simplest(only, blocks, promising(only, fits), FLOW_ROUNDS)
+    before = blocks.errors(only.rows(fit.residual))
     if blocks.gain(before, blocks.errors(only.rows(flow.residual))) < FLOW_GAIN:
-        return family, chosen
+        return family, fit
     return other, flow
 
 
 def _simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
     """Return the best of some fits; one with more parameters needs a gain."""
-    evaluate(problem, fits)
     improve(problem, fits, rounds, 1e-4, FEW_DAMPINGS)
     errors = [blocks.errors(problem.rows(fit.residual)) for fit in fits]
     chosen = 0

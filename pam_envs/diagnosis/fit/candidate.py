@@ -103,8 +103,7 @@ def fit_base(
     rounds: int = 25,
 ) -> Candidate:
     """Fit the base parameters of a plant, from the best of several starts."""
-    fits = [lsq.Fit.at_start(frees, column) for frees in starts]
-    lsq.evaluate(problem, fits)
+    fits = lsq.promising(problem, [lsq.Fit.at_start(frees, column) for frees in starts])
     if len(fits) > 1:
         lsq.improve(problem, fits, RACE, 1e-5)
         rounds -= RACE

@@ -27,6 +27,8 @@ STALLED = 1e3  # factor on all dampings after a round without improvement
 REACH_LOG, REACH = 1.0, 30.0  # longest steps in internal coordinates
 SHAPE_PRIOR = 50.0
 """Standard deviation of the size of a shape, over the noise."""
+LEAST_SHARE = 1e-9
+"""Least value over the upper bound, on a logarithmic scale whose lower bound is 0."""
 WORST = 1e4  # largest weighted residual, also of a diverged simulation
 
 
@@ -49,7 +51,7 @@ class Free:
 
     def within(self, value: float) -> float:
         """Return a value moved into the bounds, positive on a logarithmic scale."""
-        low = max(self.low, 1e-9) if self.log else self.low
+        low = LEAST_SHARE * self.high if self.log and self.low <= 0.0 else self.low
         return float(np.clip(value, low, self.high))
 
     def outer(self, z: Array) -> Array:
@@ -171,6 +173,11 @@ class Fit:
         return table_of(self.frees)
 
 
+def no_violations(columns: Array) -> Array:
+    """Return the violations of columns (n, p) where nothing is checked, shape (n, 0)."""
+    return np.zeros((len(columns), 0))
+
+
 @dataclass(frozen=True)
 class Problem:
     """Data and simulation shared by fits.
@@ -189,7 +196,7 @@ class Problem:
     # settling at the start); their sizes are solved for in every residual
     shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
     # violations of what is physical by columns (n, p), over their tolerance, shape (n, k)
-    violations: Callable[[Array], Array] = lambda columns: np.zeros((len(columns), 0))
+    violations: Callable[[Array], Array] = no_violations
     checks: int = 0  # their number k
 
     @cached_property
@@ -282,6 +289,17 @@ def _costs(problem: Problem, fit: Fit, tried: Array, residuals: Array) -> Array:
     seen = residuals[:, : problem.seen]
     priors = (tried - fit.table.start) ** 2 @ fit.table.precision
     return np.asarray(np.einsum("ki,ki->k", seen, seen) + priors)
+
+
+PROMISING = 10.0
+"""Largest cost of a start over that of the best one, from which a fit is tried."""
+
+
+def promising(problem: Problem, fits: Sequence[Fit]) -> list[Fit]:
+    """Evaluate fits at their starts; return those whose cost is near the least."""
+    evaluate(problem, fits)
+    least = min(fit.cost for fit in fits)
+    return [fit for fit in fits if fit.cost <= PROMISING * least]
 
 
 def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:
