@@ -5,7 +5,7 @@ friction and in the order and rate of the regulator. A cause is judged by what i
 have been fitted (kennedy2001). A difference that the recording does not need is dropped again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -72,6 +72,16 @@ def together(forms: Sequence[Form]) -> Form:
     """Return the form with the terms of several forms."""
     terms = {term.name: term for form in forms for term in form.terms}
     return Form(" and ".join(form.name for form in forms), tuple(terms.values()))
+
+
+def _shown(
+    causes: Sequence[tuple[Cause, Form]], names: Collection[str]
+) -> Iterator[tuple[Cause, Form]]:
+    """Yield causes with the terms of some names, without those that have no amount left."""
+    for cause, form in causes:
+        terms = tuple(t for t in form.terms if t.name in names)
+        if any(t.amount for t in terms):
+            yield cause, replace(form, terms=terms)
 
 
 @dataclass(frozen=True)
@@ -256,7 +266,7 @@ class FlexibleBase:
         lsq.evaluate(self.problem, [less])
         lsq.improve(self.problem, [less], SPARSE_ROUNDS, 1e-4)
         errors = self.blocks.errors(self.problem.rows(less.residual))
-        smaller = Candidate(model.causes, less, errors)
+        smaller = Candidate(tuple(_shown(model.causes, {f.name for f in frees})), less, errors)
         return smaller if self.blocks.gain(smaller.errors, model.errors) < SPARSE_LOSS else model
 
     def fits(self) -> bool:

@@ -41,7 +41,7 @@ class Rule:
     # which it is named; a smaller one is a calibration
     common_gain: float = 0.3
     # gain of a cause that is like another law, on a rig whose law or friction differs from the base
-    lawlike_gain: float = 1.0
+    lawlike_gain: float = 0.3
     # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
     # this share of the gain of a model that leaves only noise: otherwise it corrects the first form
     second_gain: float = 0.1
