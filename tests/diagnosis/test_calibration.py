@@ -69,15 +69,8 @@ def made(family, diameter, length, full, loads) -> tuple[SingleMuscle, Recording
     return plant, Recording.from_arrays(time, command, contraction=x, pressure=p, **given), rig
 
 
-MISSED = pytest.mark.xfail(
-    reason="known defect, cause not isolated: held-out contraction 2.7 times the noise"
-)
-
-
 @needs_kernels
-@pytest.mark.parametrize(
-    "case", [THIN, SOFT, pytest.param(STRONG, marks=MISSED)], ids=["thin", "soft", "strong"]
-)
+@pytest.mark.parametrize("case", [THIN, SOFT, STRONG], ids=["thin", "soft", "strong"])
 def test_muscle_of_any_size_is_calibrated_to_its_noise(case, tmp_path):
     true, recording, rig = made(*case)
     found = calibrate(recording, rig, progress=False)

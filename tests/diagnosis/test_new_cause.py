@@ -41,7 +41,6 @@ def folder(tmp_path):
     return tmp_path
 
 
-@pytest.mark.xfail(reason="known defect: a small rate limit is named beside the right cause")
 @needs_kernels
 def test_cause_from_a_folder_is_found_in_the_rig_that_hides_its_counterpart(folder):
     random = np.random.default_rng(8)

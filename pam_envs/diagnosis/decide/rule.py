@@ -14,7 +14,7 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "6"  # part of every report
+    version: str = "7"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     trial_penalty: float = (
@@ -40,7 +40,9 @@ class Rule:
     # gain of a common difference from the base (another law, another drive of the friction) above
     # which it is named; a smaller one is a calibration
     common_gain: float = 0.3
-    # gain of a cause that is like another law, on a rig whose law or friction differs from the base
+    # the same of a common difference that is like another law, on a rig whose law or friction
+    # differs from the base; and of a further cause that is
+    lawlike_common_gain: float = 1.0
     lawlike_gain: float = 0.3
     # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
     # this share of the gain of a model that leaves only noise: otherwise it corrects the first form

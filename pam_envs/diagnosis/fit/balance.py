@@ -277,7 +277,8 @@ class Balance:
         made = []
         for law, terms in ((stiff, -by_strain), (slope, by_pressure)):
             wanted = c[: len(LAW)] @ law
-            wanted = np.maximum(wanted, LEAST_STIFF * float(np.median(np.abs(wanted))))
+            usual = max(float(np.median(np.abs(wanted))), 1e-12)
+            wanted = np.maximum(wanted, LEAST_STIFF * usual)
             made.append(np.vstack([law, other, terms, wanted]) / (spread * wanted))
         return made[0], made[1]
 

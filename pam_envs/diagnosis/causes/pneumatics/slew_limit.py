@@ -2,7 +2,8 @@
 
 A fully open valve passes a limited flow, so that large steps follow a straight ramp before they
 round off. Small steps do not reach the limit and follow the lag alone. The flow through the
-orifices of supply and exhaust limits the rate to one that depends on the pressure.
+orifices of supply and exhaust limits the rate to one that depends on the pressure. Rates of
+filling and exhaust that differ by more than 2.5 times are an asymmetry of the exhaust.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
@@ -16,7 +17,7 @@ CAUSE = Cause(
             (
                 Term("regulator.slew_rate", (3e5, 1e6, 3e6, 8e6), low=5e4, high=1e8, log=True),
                 Term("regulator.slew_bend", (0.5,), scale=0.5, amount=False),
-                Term("regulator.slew_ratio", (1.0,), log=True, amount=False, prior=1.5),
+                Term("regulator.slew_ratio", (1.0,), low=0.4, high=2.5, log=True, amount=False),
             ),
         ),
         Form(
