@@ -177,7 +177,7 @@ class FlexibleBase:
         """Return the gain from which a common difference of a model is named."""
         others = [c for c, _ in model.causes if c.name != cause.name]
         apart = cause.by_nature or not any(c.lawlike for c in others)
-        return self.rule.common_gain if apart else self.rule.lawlike_common_gain
+        return self.rule.common_gain if apart else self.rule.lawlike_further
 
     def expected(self, model: Candidate) -> dict[str, float]:
         """Return the gain lost without each common difference, by a linear model of the residual.

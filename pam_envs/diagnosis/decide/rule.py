@@ -40,10 +40,10 @@ class Rule:
     # gain of a common difference from the base (another law, another drive of the friction) above
     # which it is named; a smaller one is a calibration
     common_gain: float = 0.3
-    # the same of a common difference that is like another law, on a rig whose law or friction
-    # differs from the base; and of a further cause that is
-    lawlike_common_gain: float = 1.0
+    # gain of a cause that is like another law, on a rig whose law or friction differs from the
+    # base: of the first cause, and of a common difference or a further cause, which corrects others
     lawlike_gain: float = 0.3
+    lawlike_further: float = 1.0
     # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
     # this share of the gain of a model that leaves only noise: otherwise it corrects the first form
     second_gain: float = 0.1
@@ -84,7 +84,7 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
     level, first = 1, levels[1]["gain"]
     while level + 1 < len(levels) and level < rule.most:
         required = max(least, required_gain(first, levels[level + 1]["possible"], rule))
-        if not is_accepted(levels[level + 1], required, rule):
+        if not is_accepted(levels[level + 1], required, rule, rule.lawlike_further):
             break
         level += 1
     found = levels[level]
@@ -99,12 +99,20 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
 
 
 def oscillates_still(before: Mapping[str, Any], after: Mapping[str, Any], rule: Rule) -> bool:
-    """Return whether a spectral peak remains in a channel, at the same frequency."""
+    """Return whether a spectral peak remains in a channel, at the same frequency.
+
+    Heights are relative to a neighbourhood, which falls with the mean square of the channel.
+    """
+    channels = ("peaks", "by_channel")
+    rows = zip(
+        *(before[name] for name in channels), *(after[name] for name in channels), strict=True
+    )
     return any(
         was > rule.peak
-        and now > max(rule.peak, rule.lasting * was)
+        and now > rule.peak
+        and now * left > rule.lasting * was * square
         and abs(frequency - known) < SAME_FREQUENCY * known
-        for (known, was), (frequency, now) in zip(before["peaks"], after["peaks"], strict=True)
+        for (known, was), square, (frequency, now), left in rows
     )
 
 
@@ -121,9 +129,15 @@ def required_gain(first: float, possible: float, rule: Rule) -> float:
     return max(rule.second_gain, min(ways))
 
 
-def is_accepted(level: Mapping[str, Any], required: float, rule: Rule) -> bool:
-    """Return whether a further cause has the required gain, and a significant one."""
-    least = max(required, rule.lawlike_gain) if level.get("lawlike", False) else required
+def is_accepted(
+    level: Mapping[str, Any], required: float, rule: Rule, lawlike: float | None = None
+) -> bool:
+    """Return whether a further cause has the required gain, and a significant one.
+
+    One that is like another law needs the gain ``lawlike``, by default that of a first cause.
+    """
+    lawlike = rule.lawlike_gain if lawlike is None else lawlike
+    least = max(required, lawlike) if level.get("lawlike", False) else required
     return bool(level["added"] >= least and level["unsure"] <= rule.doubt)
 
 

@@ -189,7 +189,8 @@ class Ladder:
         for k, level in enumerate(levels):
             before = levels[max(k - 1, 0)].model
             further = [c for c, _ in level.model.causes if c.name not in before.names]
-            lawlike = bool(further) and self.differs() and all(c.lawlike for c in further)
+            differs = k > 1 or self.differs()
+            lawlike = bool(further) and differs and all(c.lawlike for c in further)
             made.append(
                 {
                     "gain": self.gain(level.model),

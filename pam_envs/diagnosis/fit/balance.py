@@ -29,7 +29,7 @@ FEWEST, MOST = 200, 4000  # least and largest number of samples
 ROUNDS = 4
 USUAL_STIFF = 2000.0  # stiffness over strain [N] of the first weights
 LEAST_STIFF = 0.15  # least stiffness of a weight, over the median
-STIFF_SPREAD, STATE_SPREAD = 0.5, 0.5
+STIFF_SPREAD, STATE_SPREAD = 1.0, 1.0
 """Standard deviations of stiffness and slope, over those of the plain law: on average over all
 samples, and at each of the states at which a fit checks them."""
 BREAKS_IN_LENGTH, GROWTHS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.09), (0.0, 1e-6, 4e-6, 1.5e-5)
@@ -262,6 +262,8 @@ class Balance:
         at = self.pressure[some], self.strain[some]
         spread = STIFF_SPREAD * np.sqrt(len(some) / len(self.rows))
         stiff, _ = self._near_plain(*at, spread)
+        if not self.family.states.size:
+            return stiff
         pressure, strain = self.family.states
         return np.hstack([stiff, *self._near_plain(pressure, strain, STATE_SPREAD)])
 

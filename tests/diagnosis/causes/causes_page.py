@@ -35,7 +35,6 @@ GIVEN = {
     "muscle.rest_length": "RIG.yaml, `muscle: {rest_length_mm}`",
     "muscle.diameter": "RIG.yaml, `muscle: {diameter_mm}`; only the air consumption depends on it",
     "muscle.braid_angle": "the plant; only drawings depend on it",
-    "muscle.braid_strain": "the plant, or the best of a few strains",
     "muscle.map_pressure": "the plant; range of the map of `static_law`",
     "muscle.map_strain": "the plant; range of the map of `static_law`",
     "muscle.temperature": "the recording, `temperature_C`; 20 °C without it",

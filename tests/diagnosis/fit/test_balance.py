@@ -79,34 +79,47 @@ def test_it_finds_the_static_law(family: MuscleFamily) -> None:
 def test_it_finds_friction_of_each_kind(
     family: MuscleFamily, values: dict[str, float], kind: str
 ) -> None:
-    found = balance(family, **values).flexible()
+    made = balance(family, **values)
+    found = made.flexible()
     sizes = {
         "hysteresis.yield_": found.get("hysteresis.yield_width", 0.0) * found["muscle.area"],
         "muscle.yield_": found.get("muscle.yield_force", 0.0),
         "muscle.strand_": sum(found.get(f"muscle.strand_{k}", 0.0) for k in (1, 2, 3, 4)),
     }
     assert max(sizes, key=lambda name: sizes[name]) == kind
-    named = {name.replace("__", "."): value for name, value in values.items()}
-    true = {
-        "hysteresis.yield_": named.get("hysteresis.yield_width", 0.0) * found["muscle.area"],
-        "muscle.yield_": named.get("muscle.yield_force", 0.0),
-        "muscle.strand_": named.get("muscle.strand_1", 0.0) + named.get("muscle.strand_3", 0.0),
-    }
-    assert sizes[kind] == pytest.approx(true[kind], rel=0.4)
+    assert sizes[kind] > 0.25 * values[next(iter(values))] * (
+        found["muscle.area"] if kind == "hysteresis.yield_" else 1.0
+    )
+    moved = misread(family, made, found, plant_force(family, made))
+    assert np.std(moved) < 2.0 * NOISE  # plays may take a part of the friction, and the law of it
+
+
+def plant_force(family: MuscleFamily, made: Balance) -> Array:
+    """Return the force of the plant's static law at the samples of a balance [N]."""
+    return np.asarray(family.plant.muscle.tension(made.pressure, made.strain))
+
+
+def misread(family: MuscleFamily, made: Balance, found: dict[str, float], true: Array) -> Array:
+    """Return the error of a found law as one of the contraction [m], without its mean."""
+    off = force(family, found, made.pressure, made.strain) - true
+    moved = off * family.plant.muscle.rest_length / made._plain[2]
+    return np.asarray(moved - moved.mean())
 
 
 def test_the_map_is_found_where_the_law_has_another_shape(family: MuscleFamily) -> None:
-    size = 8.0
+    size = 16.0
     changed = balance(family, muscle__map_22=size)
-    inflated = changed.pressure > 1e5  # a muscle without pressure hangs on its stop
-    p, e = changed.pressure[inflated], changed.strain[inflated]
-    found = force(family, changed.flexible(), p, e)
-    found -= force(family, balance(family).flexible(), p, e)
     law = family.plant.muscle
-    true = size * order_two(2.0 * p / law.map_pressure - 1.0)
-    true *= order_two(2.0 * e / law.map_strain - 1.0)
-    assert np.std(true) > 1.0
-    assert np.std(found - true) < 0.4 * np.std(true)
+    mapped = size * order_two(2.0 * changed.pressure / law.map_pressure - 1.0)
+    mapped *= order_two(2.0 * changed.strain / law.map_strain - 1.0)
+    true = plant_force(family, changed) + mapped
+    inflated = changed.pressure > 1e5  # a muscle without pressure hangs on its stop
+    with_map, without = (
+        np.std(misread(family, changed, found, true)[inflated])
+        for found in (changed.flexible(), balance(family).flexible())
+    )
+    assert without > 5.0 * NOISE
+    assert with_map < 0.3 * without
 
 
 def test_too_few_slow_samples_give_no_balance(family: MuscleFamily) -> None:

@@ -2,8 +2,8 @@
 
 The zero of an amplifier, or a muscle that was not at rest when the sensor was zeroed, shifts every
 reading by the same amount at all pressures and loads. An amplifier that was just switched on, or
-whose supply changes, reaches its bias within :data:`LONGEST`; a slower change is a drift. Only the
-reading is affected.
+whose supply changes, reaches its bias within 40 s; a slower change is a drift. Only the reading is
+affected.
 """
 
 from collections.abc import Callable

@@ -2,7 +2,7 @@
 
 Electronics warm up, a clamp or a coating settles, a bridge amplifier follows the room temperature.
 The error depends on time alone, not on the muscle: it settles exponentially, or changes between two
-moments and then is constant. A change within :data:`~.sensor_bias.LONGEST` is a bias.
+moments and then is constant. A change within 40 s is a bias.
 """
 
 from collections.abc import Callable
