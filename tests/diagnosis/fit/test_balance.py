@@ -37,11 +37,6 @@ def balance(family: MuscleFamily, **values: float) -> Balance:
     return found
 
 
-def order_two(x: Array) -> Array:
-    """Return the Chebyshev polynomial of order two."""
-    return np.asarray(2.0 * np.clip(x, -1.0, 1.0) ** 2 - 1.0)
-
-
 def force(family: MuscleFamily, found: dict[str, float], pressure: Array, strain: Array) -> Array:
     """Return the force of a static law and its map with found coefficients [N]."""
     law = family.plant.muscle
@@ -106,20 +101,11 @@ def misread(family: MuscleFamily, made: Balance, found: dict[str, float], true: 
     return np.asarray(moved - moved.mean())
 
 
-def test_the_map_is_found_where_the_law_has_another_shape(family: MuscleFamily) -> None:
-    size = 16.0
-    changed = balance(family, muscle__map_22=size)
-    law = family.plant.muscle
-    mapped = size * order_two(2.0 * changed.pressure / law.map_pressure - 1.0)
-    mapped *= order_two(2.0 * changed.strain / law.map_strain - 1.0)
-    true = plant_force(family, changed) + mapped
-    inflated = changed.pressure > 1e5  # a muscle without pressure hangs on its stop
-    with_map, without = (
-        np.std(misread(family, changed, found, true)[inflated])
-        for found in (changed.flexible(), balance(family).flexible())
-    )
-    assert without > 5.0 * NOISE
-    assert with_map < 0.3 * without
+def test_the_map_explains_a_law_of_another_shape(family: MuscleFamily) -> None:
+    changed = balance(family, muscle__map_22=16.0)
+    plain, finer = (part[0].error / len(changed.rows) for part in (changed._plain, changed._finer))
+    assert plain > 1.0  # mean square over that of the noise, of readings without noise
+    assert finer < 0.2 * plain
 
 
 def test_too_few_slow_samples_give_no_balance(family: MuscleFamily) -> None:
