@@ -102,7 +102,7 @@ def misread(family: MuscleFamily, made: Balance, found: dict[str, float], true: 
 
 
 def test_the_map_explains_a_law_of_another_shape(family: MuscleFamily) -> None:
-    changed = balance(family, muscle__map_22=16.0)
+    changed = balance(family, muscle__map_22=30.0)
     plain, finer = (part[0].error / len(changed.rows) for part in (changed._plain, changed._finer))
     assert plain > 1.0  # mean square over that of the noise, of readings without noise
     assert finer < 0.2 * plain
