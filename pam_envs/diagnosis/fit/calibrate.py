@@ -21,6 +21,7 @@ from pam_envs.diagnosis.fit.least_squares import (
     column_of,
     evaluate,
     improve,
+    near,
     no_violations,
     promising,
 )
@@ -39,7 +40,8 @@ from pam_envs.pneumatics.flow import REPLACED
 
 FAST = 0.04  # lag [s] below which the replay takes finer steps
 FINE_STEP = 0.0101
-GUESS_ROUNDS, FLOW_ROUNDS, ROUNDS = 6, 12, 10
+RACE, GUESS_ROUNDS, FLOW_ROUNDS, ROUNDS = 2, 6, 12, 10
+"""Rounds after which only fits near the best one continue, and rounds of each stage."""
 DAMPING = "mass.damping"
 SMOOTH = 0.1  # window [s] over which measured pressures are averaged
 
@@ -235,7 +237,8 @@ def orifices(
 
 def _simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
     """Return the best of some fits; one with more parameters needs a gain."""
-    improve(problem, fits, rounds, 1e-4, FEW_DAMPINGS)
+    improve(problem, fits, RACE, 1e-4, FEW_DAMPINGS)
+    improve(problem, near(fits), rounds - RACE, 1e-4, FEW_DAMPINGS)
     errors = [blocks.errors(problem.rows(fit.residual)) for fit in fits]
     chosen = 0
     for k in range(1, len(fits)):

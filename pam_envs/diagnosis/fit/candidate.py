@@ -184,8 +184,10 @@ def without_each_cause(
     if not fits:
         return {}
     lsq.evaluate(problem, fits)
-    lsq.improve(problem, fits, FEW_ROUNDS, 1e-4, lsq.FEW_DAMPINGS)
-    best = best_by_name(zip(labels, fits, strict=True))
+    pairs = zip(labels[::2], fits[::2], fits[1::2], strict=True)
+    named = [(name, fit) for name, *both in pairs for fit in lsq.near(both)]
+    lsq.improve(problem, [fit for _, fit in named], FEW_ROUNDS, 1e-4, lsq.FEW_DAMPINGS)
+    best = best_by_name(named)
     close = [f for f in best.values() if np.log(f.cost / model.fit.cost) < clear]
     polish(problem, close)
     return {

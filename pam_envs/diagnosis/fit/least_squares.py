@@ -292,12 +292,17 @@ def _costs(problem: Problem, fit: Fit, tried: Array, residuals: Array) -> Array:
 
 
 PROMISING = 10.0
-"""Largest cost of a start over that of the best one, from which a fit is tried."""
+"""Largest cost over the least one with which a fit continues."""
 
 
 def promising(problem: Problem, fits: Sequence[Fit]) -> list[Fit]:
     """Evaluate fits at their starts; return those whose cost is near the least."""
     evaluate(problem, fits)
+    return near(fits)
+
+
+def near(fits: Sequence[Fit]) -> list[Fit]:
+    """Return the fits whose cost is near the least."""
     least = min(fit.cost for fit in fits)
     return [fit for fit in fits if fit.cost <= PROMISING * least]
 
