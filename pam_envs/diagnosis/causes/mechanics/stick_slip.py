@@ -8,7 +8,7 @@ with the kinetic friction. Weak sticking resembles a loss that depends on direct
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.fit.starting_values import grid
 
-_BREAKS = (0.8, 1.3, 2.1, 3.4, 5.0, 7.2, 10.0, 15.0)
+_BREAKS = (0.8, 1.3, 2.1, 3.4, 5.0, 7.2, 10.0, 15.0, 25.0)
 _HOLDS = (0.45, 0.7)
 _SPEEDS = (5e-4, 3e-3)
 

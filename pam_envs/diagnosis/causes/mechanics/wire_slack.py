@@ -9,7 +9,9 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="wire_slack",
     title="the slack of the wire",
-    forms=(Form("unilateral", (Term("mass.slack", (2e-4, 5e-4, 1.2e-3), scale=1e-4),)),),
+    forms=(
+        Form("unilateral", (Term("mass.slack", (2e-4, 5e-4, 1.2e-3, 3e-3, 6e-3), scale=1e-4),)),
+    ),
     signature="a steep rise, then a pause until the load is lifted, longer under larger loads",
     neighbours=("threshold_pressure", "load_dependent_compliance", "static_law"),
     experiment=(

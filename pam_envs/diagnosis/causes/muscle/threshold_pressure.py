@@ -10,7 +10,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="threshold_pressure",
     title="the threshold pressure of the muscle",
-    forms=(Form("hard", (Term("hysteresis.threshold", (5e3,), scale=2e3),)),),
+    forms=(Form("hard", (Term("hysteresis.threshold", (5e3, 2e4, 5e4), scale=2e3),)),),
     signature="the contraction starts late, with a kink, at the same pressure under every load",
     neighbours=("sensor_bias", "wire_slack", "valve_dead_band", "static_law"),
     experiment=(

@@ -14,7 +14,7 @@ CAUSE = Cause(
         Form(
             "lag",
             (
-                Term("regulator.exhaust_ratio", (1.2,), log=True),
+                Term("regulator.exhaust_ratio", (1.2, 2.0), log=True),
                 Term("regulator.exhaust_taper", (0.3,), scale=0.5, amount=False),
             ),
         ),

@@ -10,7 +10,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="leak",
     title="a leak behind the valve",
-    forms=(Form("exponential", (Term("regulator.leak", (0.01,), high=2.0, scale=0.005),)),),
+    forms=(Form("exponential", (Term("regulator.leak", (0.01, 0.1), high=2.0, scale=0.005),)),),
     signature="with the valve closed pressure and contraction fall, faster from higher pressures",
     neighbours=("creep", "sensor_drift", "valve_dead_band"),
     experiment=(

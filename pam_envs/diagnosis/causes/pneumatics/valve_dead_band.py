@@ -10,14 +10,14 @@ parameter is the error at which it closes over that at which it opens.
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.fit.starting_values import grid
 
-_OPENS = (1.5e3, 3e3, 4.5e3, 6e3, 7.5e3, 9.5e3, 1.2e4, 1.5e4, 2e4)
+_OPENS = (1.5e3, 3e3, 4.5e3, 6e3, 7.5e3, 9.5e3, 1.2e4, 1.5e4, 2e4, 3e4, 4.5e4)
 _CLOSES = (0.2, 0.45, 0.7)
 
 CAUSE = Cause(
     name="valve_dead_band",
     title="a dead band of the valve",
     forms=(
-        Form("dead zone", (Term("regulator.dead_band", (3e3, 1e4), scale=2e3),)),
+        Form("dead zone", (Term("regulator.dead_band", (3e3, 1e4, 3e4), scale=2e3),)),
         Form(
             "overlap",
             (

@@ -9,7 +9,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="sensor_delay",
     title="the delay of the position sensor",
-    forms=(Form("delay", (Term("position.delay", (0.02,), scale=0.01),)),),
+    forms=(Form("delay", (Term("position.delay", (0.02, 0.06), scale=0.01),)),),
     signature="the error is that of the same delay at every speed; the pressure fits",
     neighbours=("dead_time", "viscous_loss"),
     experiment=(
