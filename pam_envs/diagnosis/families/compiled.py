@@ -30,6 +30,7 @@ from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.parameters import Declaration
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.core.rollout import BEGIN, run
+from pam_envs.pneumatics.flow import SWITCH
 
 WEIGHT = "hysteresis.weight["
 WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
@@ -141,14 +142,11 @@ class CompiledFamily:
             name
             for name, off in self.plant.neutral.items()
             if name not in names
-            and name not in self.kept
+            and name != SWITCH
             and self.plant.value(name) != off
             and not (self.measured_drive and in_valve(name))
         ]
         return tuple(self.free(name) for name in (*names, *present))
-
-    kept: ClassVar[frozenset[str]] = frozenset()
-    """Parameters with a neutral value that belong to the plant, and are not fitted."""
 
     def plant_of(self, column: Array) -> Any:
         """Return the plant with the parameters of a column."""
