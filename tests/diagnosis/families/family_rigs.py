@@ -66,9 +66,7 @@ class FamilyRig:
             for name, size in self.noise.items()
         }
         time = PERIOD * np.arange(len(labels))
-        return Recording.of_channels(
-            time, inputs, noisy, plant=self.plant.family, segment=labels
-        )
+        return Recording.of_channels(time, inputs, noisy, plant=self.plant.family, segment=labels)
 
 
 def _elbow(a: Array, b: Array) -> tuple[dict[str, Array], dict[str, Any]]:

@@ -148,7 +148,7 @@ def run(
     for k in range(m):
         strain[k] = place(kinds[3], geometry, k % sides, q[k // sides])[0]
     settle = int(20.0 / dt)  # reaches rest before the first row
-    late = int(round(valve[5] / dt))
+    late = round(valve[5] / dt)
     for step in range(-settle, rows * sub):
         row = max(step, 0) // sub
         then = max(step - late, 0) // sub

@@ -94,7 +94,9 @@ FAMILIES: dict[str, Family] = {
 }
 
 
-def _muscles(family: Family, random: np.random.Generator, hidden: Mapping[str, float]) -> np.ndarray:
+def _muscles(
+    family: Family, random: np.random.Generator, hidden: Mapping[str, float]
+) -> np.ndarray:
     """Draw the muscles of a joint, alike but for their size, and repeat them for every joint."""
     shape = {
         "most": family.most * random.uniform(0.95, 1.05),
