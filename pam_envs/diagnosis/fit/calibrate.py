@@ -148,7 +148,7 @@ def regulator(
             limits += [frees_for(family, form, values) for values in form.starts]
     fits = [Fit.at_start((*order, *limit), family.column) for order in orders for limit in limits]
     only = dataclasses.replace(problem, measured=alone)
-    chosen = _simplest(only, blocks, fits)
+    chosen = simplest(only, blocks, fits)
     if "regulator.pilot_lag" in chosen.values():
         pilot = {name: chosen.values()[name] for name in PILOT}
         family = dataclasses.replace(family, plant=family.plant.replace(pilot))
@@ -166,13 +166,13 @@ def regulator(
         )
     ]
     only = dataclasses.replace(only, simulate=other.simulate, tie=other.tie)
-    flow = _simplest(only, blocks, [Fit.at_start(frees, other.column) for frees in starts], 12)
+    flow = simplest(only, blocks, [Fit.at_start(frees, other.column) for frees in starts], 12)
     if blocks.gain(before, blocks.errors(only.rows(flow.residual))) < FLOW_GAIN:
         return family, chosen
     return other, flow
 
 
-def _simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
+def simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
     """Return the best of some fits; one with more parameters needs a gain."""
     evaluate(problem, fits)
     improve(problem, fits, rounds, 1e-4, FEW_DAMPINGS)
