@@ -26,8 +26,8 @@ HIDDEN = {
 ENVIRONMENTS = {
     "ELBOW": "PAM/ElbowOrthosis-v0",
     "KNEE": "PAM/KneeStiffness-v0",
-    "ARM": "PAM/RedundantManipulator-v0",
 }
+"""Environments of the rigs; those of the arm need five joints, and the rig has two."""
 
 
 @needs_kernels
@@ -43,9 +43,12 @@ def test_hidden_effect_is_named_and_its_plant_goes_into_an_environment(family, t
     found.write(tmp_path)
     assert "<svg" in (tmp_path / "report.html").read_text()
     report = json.loads((tmp_path / "report.json").read_text())
-    env = gym.make(ENVIRONMENTS[family], plant=str(tmp_path / "plant.yaml"))
-    assert env.unwrapped.plant.digest() == report["provenance"]["plant_after"]
-    env.close()
+    path, digest = tmp_path / "plant.yaml", report["provenance"]["plant_after"]
+    assert type(found.plant).from_yaml(path).digest() == digest
+    if family in ENVIRONMENTS:
+        env = gym.make(ENVIRONMENTS[family], plant=str(path))
+        assert env.unwrapped.plant.digest() == digest
+        env.close()
 
 
 @needs_kernels
@@ -83,7 +86,7 @@ def test_sensor_causes_of_a_knee_have_forms_of_angle_and_tension():
 def test_every_output_of_a_recording_is_simulated(name):
     kind = kind_named(name)
     plant = kind.start(Rig(plant=name))
-    n, period = 8, 0.02
+    n, period = 12, 0.02
     wiring = WIRINGS[name]
     known = {c.name for c in wiring.inputs} & set(kind.pairs_of(plant))
     inputs = {c: np.full(n, 1.5e5) for c in known}
@@ -99,7 +102,7 @@ def test_every_output_of_a_recording_is_simulated(name):
 def test_largest_lag_of_the_elbow_follows_the_weights_of_its_friction():
     kind = kind_named("elbow_orthosis")
     plant = kind.start(Rig(plant="elbow_orthosis"))
-    n = 8
+    n = 12
     inputs = {"set_point_a": np.full(n, 1e5), "set_point_b": np.full(n, 1e5)}
     made = Recording.of_channels(
         0.02 * np.arange(n), inputs, {"angle": np.zeros(n)}, plant=plant.family
@@ -113,7 +116,7 @@ def test_largest_lag_of_the_elbow_follows_the_weights_of_its_friction():
 
 
 def test_variants_that_cannot_be_replayed_are_refused_with_a_remedy():
-    n = 8
+    n = 12
     made = Recording.of_channels(
         0.02 * np.arange(n),
         {"set_point": np.full(n, 1e5)},
