@@ -12,10 +12,12 @@ from pam_envs.data.recording.recording import Recording, RecordingError, load_re
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import diagnose
 from pam_envs.diagnosis.families.kinds import KINDS, kind_named
+from pam_envs.plants.core.replay import replay_plant
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from tests.diagnosis.conftest import needs_kernels
 from tests.diagnosis.families import family_rigs
+from tests.diagnosis.families.joint_rig import PERIOD, campaign
 
 CREEP = {"hysteresis__creep_1": 0.01, "hysteresis__creep_2": 0.01}
 HIDDEN = {
@@ -97,6 +99,25 @@ def test_every_output_of_a_recording_is_simulated(name):
     assert {o.name for o in kind.outputs} >= set(bound.channels)
     assert len(bound.loop.outputs) == len(bound.channels)
     assert len(set(bound.loop.outputs)) == len(bound.channels)
+
+
+@pytest.mark.parametrize("family", ["ELBOW", "HELD", "ARM"])
+def test_replay_of_a_recording_is_that_of_the_plant(family):
+    rig = getattr(family_rigs, family)
+    plant = rig.truth(**CREEP)
+    part = slice(650, 690)  # of the first triangle, in motion
+    setpoints, _ = campaign()
+    a, b = setpoints["set_point_a"][part], setpoints["set_point_b"][part]
+    inputs, driving = rig.inputs(a, b)
+    outputs = {name: np.zeros(len(a)) for name in rig.outputs}
+    made = Recording.of_channels(PERIOD * np.arange(len(a)), inputs, outputs, plant=plant.family)
+    bound = kind_named(plant.family).bind(plant, made, rig.sheet)
+    found = dict(zip(bound.channels, bound.simulate(bound.column[None])[:, :, 0], strict=True))
+    substeps = int(np.ceil(PERIOD / bound.longest_step))
+    expected = replay_plant(plant, driving, period=PERIOD, substeps=substeps)
+    for name in rig.outputs:
+        assert np.array_equal(found[name], expected[name])
+    assert np.ptp(found[rig.outputs[0]]) > 0.0
 
 
 def test_largest_lag_of_the_elbow_follows_the_weights_of_its_friction():
