@@ -11,6 +11,7 @@
     valve_closed: [shut]          # segments during which the valve is shut
     tolerance: {mass.load: 0.02}  # relative tolerance of known parameters
     parameters: {link.length: 0.3} # known parameters of the plant [SI]
+    variant: {mounting: rig}      # choices of the plant, for example of a knee orthosis
     channels: {pressure_bar: {from: AI/pressure, unit: kPa}}  # of a log file, by column
 
 Every key but ``plant`` may be missing. The noise of other plants' sensors is declared under the
@@ -72,6 +73,7 @@ KEYS = (
     "valve_closed",
     "tolerance",
     "parameters",
+    "variant",
     "channels",
 )
 
@@ -116,6 +118,8 @@ class Rig:
         RMS of the noise of other plants' outputs, by channel [SI].
     parameters : mapping of str to float
         Known parameters of the plant, by dotted name [SI]; they start its fit.
+    variant : mapping of str to str
+        Choices of the plant that select a variant (``makes`` of its class).
     channels : mapping of str to ChannelSource
         Channels of the recording's file, by column; empty if the file has these columns itself.
     source : str
@@ -140,6 +144,7 @@ class Rig:
     tolerance: Mapping[str, float] = dataclasses.field(default_factory=dict)
     noise: Mapping[str, float] = dataclasses.field(default_factory=dict)
     parameters: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    variant: Mapping[str, str] = dataclasses.field(default_factory=dict)
     channels: Mapping[str, ChannelSource] = dataclasses.field(default_factory=dict)
     source: str = dataclasses.field(default="arguments", compare=False)
 
@@ -151,7 +156,11 @@ class Rig:
         }
         values = {k: v for k, v in vars(self).items() if k not in unused}
         values["tolerance"] = dict(self.tolerance)
-        for name in ("noise", "parameters"):  # they leave the digests of other files alone
+        for name in (
+            "noise",
+            "parameters",
+            "variant",
+        ):  # they leave the digests of other files alone
             given = dict(values.pop(name))
             values |= {name: given} if given else {}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
@@ -244,6 +253,7 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
         if key in noises and value is not None
     }
     given["parameters"] = _parameters(data.get("parameters"))
+    given["variant"] = _variant(data.get("variant"))
     if sections["muscle"].get("family") is not None:
         given["family"] = _family(sections["muscle"]["family"])
     if data.get("load") is not None:
@@ -325,6 +335,16 @@ def _parameters(value: Any) -> dict[str, float]:
         f"{{link.length: 0.3}}, got {shown(value)}",
     )
     return {str(k): _number(v, f"parameters.{k}", "SI") for k, v in (value or {}).items()}
+
+
+def _variant(value: Any) -> dict[str, str]:
+    _require(
+        value is None
+        or (isinstance(value, Mapping) and all(isinstance(v, str) for v in value.values())),
+        "variant must be a mapping from choice to word, for example {mounting: rig}, got "
+        f"{shown(value)}",
+    )
+    return {str(k): v for k, v in (value or {}).items()}
 
 
 def _tolerance(value: Any) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Channels of a recording: name, column of a file, unit; inputs and outputs of each plant."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -59,24 +59,74 @@ MUSCLE = {
     "force": Channel("force", "force_N", "N", 1.0),
 }
 """Measured channels of a single muscle, by field of a recording."""
-WIRINGS: dict[str, Wiring] = {
-    "antagonistic_joint": Wiring(
-        inputs=(
-            bar("set_point_a", "pressure_command_a"),
-            bar("set_point_b", "pressure_command_b"),
-            Channel("payload", "payload_kg", "kg"),
-            Channel("disturbance", "disturbance_Nm", "N m"),
-        ),
+SIDES = ("a", "b")
+
+
+def pair_channels(*more: Channel) -> Wiring:
+    """Return the channels of a joint between two muscles; ``more`` are further inputs."""
+    return Wiring(
+        inputs=(*(bar(f"set_point_{s}", f"pressure_command_{s}") for s in SIDES), *more),
         outputs=(
             Channel("angle", "angle_deg", "deg", DEGREE),
-            bar("pressure_a", "pressure_a"),
-            bar("pressure_b", "pressure_b"),
+            *(bar(f"pressure_{s}", f"pressure_{s}") for s in SIDES),
+            Channel("torque", "torque_Nm", "N m"),
+            *(Channel(f"force_{s}", f"force_{s}_N", "N") for s in SIDES),
+        ),
+        measured={f"set_point_{s}": f"pressure_{s}" for s in SIDES},
+    )
+
+
+def arm_channels(joints: int) -> Wiring:
+    """Return the channels of an arm; muscles 2 k and 2 k + 1 move joint k."""
+    muscles = range(2 * joints)
+    return Wiring(
+        inputs=(
+            *(bar(f"set_point_{m}", f"pressure_command_{m}") for m in muscles),
+            Channel("payload", "payload_kg", "kg"),
+            *(Channel(f"disturbance_{k}", f"disturbance_{k}_Nm", "N m") for k in range(joints)),
+        ),
+        outputs=(
+            *(Channel(f"angle_{k}", f"angle_{k}_deg", "deg", DEGREE) for k in range(joints)),
+            *(bar(f"pressure_{m}", f"pressure_{m}") for m in muscles),
+            *(Channel(f"torque_{k}", f"torque_{k}_Nm", "N m") for k in range(joints)),
+            *(Channel(f"force_{m}", f"force_{m}_N", "N") for m in muscles),
+        ),
+        measured={f"set_point_{m}": f"pressure_{m}" for m in muscles},
+    )
+
+
+ARM, MOST_JOINTS = "redundant_manipulator", 8
+DISTURBANCE = Channel("disturbance", "disturbance_Nm", "N m")
+WIRINGS: dict[str, Wiring] = {
+    "antagonistic_joint": pair_channels(Channel("payload", "payload_kg", "kg"), DISTURBANCE),
+    "elbow_orthosis": pair_channels(Channel("intent", "intent_deg", "deg", DEGREE), DISTURBANCE),
+    "knee_orthosis": Wiring(
+        inputs=(bar("set_point", "pressure_command"),),
+        outputs=(
+            Channel("angle", "angle_deg", "deg", DEGREE),
+            bar("pressure", "pressure"),
+            Channel("tension", "tension_N", "N"),
             Channel("torque", "torque_Nm", "N m"),
         ),
-        measured={"set_point_a": "pressure_a", "set_point_b": "pressure_b"},
+        measured={"set_point": "pressure"},
     ),
+    ARM: arm_channels(MOST_JOINTS),
 }
-"""Channels of the plants with more than one muscle, by family."""
+"""Channels of the plants other than a single muscle, by family."""
+
+
+def wiring_of(family: str, columns: Iterable[str]) -> Wiring:
+    """Return the channels of a plant; of an arm, those of the joints that a file has."""
+    if family != ARM:
+        return WIRINGS[family]
+    known = {c.column: c.name for c in WIRINGS[ARM].channels.values()}
+    last = 0
+    for column in columns:
+        stem, _, number = known.get(column, "").rpartition("_")
+        if number.isdigit():
+            muscle = stem in ("set_point", "pressure", "force")
+            last = max(last, int(number) // 2 if muscle else int(number))
+    return arm_channels(last + 1)
 
 
 def excitation(inputs: Mapping[str, Array], samples: int, noisy: bool = False) -> Array:

@@ -18,7 +18,14 @@ from numpy.typing import ArrayLike
 from pam_envs.arrays import Array, Flags, Indices
 from pam_envs.constants import BAR, MM
 from pam_envs.data.recording import clock as clocks
-from pam_envs.data.recording.channels import MUSCLE, WIRINGS, Channel, Wiring, excitation
+from pam_envs.data.recording.channels import (
+    MUSCLE,
+    WIRINGS,
+    Channel,
+    Wiring,
+    excitation,
+    wiring_of,
+)
 from pam_envs.data.recording.columns import (
     LONGEST_LABEL,
     RecordingError,
@@ -397,10 +404,11 @@ def _columns(sheet: Sheet) -> tuple[dict[str, Array], list[str]]:
 
 
 def _load_of_plant(path: str | Path, rig: Rig) -> Recording:
-    """Read a recording of a plant with more than one muscle."""
-    wiring = WIRINGS[rig.plant]
+    """Read a recording of a plant other than a single muscle."""
+    known = ("time_s", "segment", *(c.column for c in WIRINGS[rig.plant].channels.values()))
+    sheet = sheet_of(path, rig.channels, known, ("time_s",), "a recording")
+    wiring = wiring_of(rig.plant, sheet.cells)
     fields = {c.column: c for c in (*wiring.inputs, *wiring.outputs)}
-    sheet = sheet_of(path, rig.channels, ("time_s", "segment", *fields), ("time_s",), "a recording")
     n, problems, columns = len(sheet.rows), [], {}
     for name in ("time_s", *fields):
         if name not in sheet.cells:

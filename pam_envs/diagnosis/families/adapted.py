@@ -6,9 +6,29 @@ from itertools import compress
 from typing import Any
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
-from pam_envs.diagnosis.fit.starting_values import Grid
+from pam_envs.diagnosis.causes import by_name, catalogue
+from pam_envs.diagnosis.fit.starting_values import Grid, grid
 from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+HOLDS, SPEEDS = (0.45, 0.7), (0.02, 0.1)
+"""Kinetic over breakaway friction, and Stribeck speeds [rad/s], at which a search begins."""
+
+
+def with_bearing(component: str, breaks: Sequence[float]) -> tuple[Cause, ...]:
+    """Return the shipped causes, with stick-slip in the bearing of a component.
+
+    ``breaks`` are the breakaway torques [N m] at which the search begins.
+    """
+    guide = by_name("stick_slip")
+    terms = (
+        Term(f"{component}.stick", (breaks[len(breaks) // 4],), scale=breaks[len(breaks) // 4]),
+        Term(f"{component}.stick_kinetic", (0.4,), high=0.95, scale=1.0, amount=False),
+        Term(f"{component}.stick_speed", (0.05,), high=5.0, log=True, amount=False),
+    )
+    form = Form("Stribeck", terms, search=grid(tuple(breaks), HOLDS, SPEEDS, best=5))
+    bearing = replace(guide, title="stick-slip in the bearing", forms=(form,))
+    return (*(c for c in catalogue() if c.name != guide.name), bearing)
 
 
 def adapted(

@@ -13,29 +13,33 @@ from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import MANY_CYCLES, SHUT_SECONDS, longest_shut
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.calibrate import Calibration, start_at_guess
+from pam_envs.diagnosis.fit.calibrate import Calibration, simplest, start_at_guess
 from pam_envs.diagnosis.fit.candidate import fit_base
 from pam_envs.diagnosis.fit.least_squares import (
-    FEW_DAMPINGS,
     LANES,
     Fit,
     Free,
     Problem,
     column_of,
-    evaluate,
-    improve,
 )
-from pam_envs.diagnosis.fit.single_muscle import identified
+from pam_envs.diagnosis.fit.single_muscle import PILOT, identified
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.parameters import Declaration
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.core.rollout import BEGIN, run
+from pam_envs.pneumatics.flow import SWITCH
 
 WEIGHT = "hysteresis.weight["
 WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
 ROUNDS, VALVE_ROUNDS = 25, 12
 INSTANT = {"dead_time": 0.0, "slew_rate": 1e9, "gain": 1.0}
 """Parameters of a regulator whose pressures are the measured ones."""
+PILOT_LAG = "regulator.pilot_lag"
+PILOTS: dict[str, dict[str, Any]] = {
+    PILOT_LAG: {"log": True, "low": 2e-3, "prior": 2.0},
+    "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
+}
+"""Settings of the fit of a regulator's pilot stage."""
 LEAST_LAG = 2e-3
 """Least time constant of a regulator [s]."""
 
@@ -131,24 +135,24 @@ class CompiledFamily:
         made: dict[str, Any] = {"low": d.low, "high": d.high, "start": value}
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
         place = self.plant.names.index(name)
-        return Free(name, place, **{**made, **self.settings.get(name, {}), **changes})
+        settings = {**PILOTS.get(name, {}), **self.settings.get(name, {})}
+        return Free(name, place, **{**made, **settings, **changes})
 
     def base(self) -> tuple[Free, ...]:
         """Return the base parameters, with those of effects that the plant already has."""
         names = [n for n in self.settings if not (self.measured_drive and in_valve(n))]
+        if not self.measured_drive and self.plant.value(PILOT_LAG) != 0.0:
+            names += list(PILOT)
         names += [f"{WEIGHT}{k}]" for k in range(self.elements)]
         present = [
             name
             for name, off in self.plant.neutral.items()
             if name not in names
-            and name not in self.kept
+            and name != SWITCH
             and self.plant.value(name) != off
             and not (self.measured_drive and in_valve(name))
         ]
         return tuple(self.free(name) for name in (*names, *present))
-
-    kept: ClassVar[frozenset[str]] = frozenset()
-    """Parameters with a neutral value that belong to the plant, and are not fitted."""
 
     def plant_of(self, column: Array) -> Any:
         """Return the plant with the parameters of a column."""
@@ -225,22 +229,37 @@ def one_ahead(values: Array, recording: Recording) -> Array:
     return np.where(last, values, ahead)
 
 
+def regulator_of(
+    problem: Problem, family: Any, blocks: Blocks
+) -> tuple[Any, Mapping[str, float], Array]:
+    """Return the plant with the regulator that the pressures need, its values, and the column.
+
+    Of first order, or with a pilot stage if it is better on held-out pressures.
+    """
+    valve = tuple(f for f in family.base() if in_valve(f.name))
+    pressures = np.array([c.startswith("pressure") for c in family.channels])
+    alone = np.where(pressures[:, None], problem.measured, np.nan)
+    if not valve or not np.isfinite(alone).any():
+        return family, {}, family.column
+    only = dataclasses.replace(problem, measured=alone)
+    orders = [valve]
+    if not {f.name for f in valve} & set(PILOT) and family.plant.air == "regulator":
+        orders.append((*valve, *(family.free(name, start=start) for name, start in PILOT.items())))
+    fits = [Fit.at_start(frees, family.column) for frees in orders]
+    chosen = simplest(only, blocks, fits, VALVE_ROUNDS)
+    found = chosen.values()
+    pilot = {name: found[name] for name in PILOT if name in found}
+    family = dataclasses.replace(family, plant=family.plant.replace(pilot))
+    return family, found, column_of(chosen, chosen.z)
+
+
 def calibrate_compiled(
     family: Any, measured: Array, noise: Array, blocks: Blocks, time: Array, shapes: Array
 ) -> Calibration:
     """Fit the base of a plant: the regulator to the pressures alone, then all parameters."""
     problem = Problem(family.simulate, measured, noise, blocks.train, time, family.tie, shapes)
-    frees, column = family.base(), family.column
-    valve = tuple(f for f in frees if in_valve(f.name))
-    alone = measured.copy()
-    pressures = np.array([c.startswith("pressure") for c in family.channels])
-    alone[~pressures] = np.nan
-    found: dict[str, float] = {}
-    if valve and np.isfinite(alone).any():
-        fit = Fit.at_start(valve, column)
-        only = dataclasses.replace(problem, measured=alone)
-        evaluate(only, [fit])
-        improve(only, [fit], VALVE_ROUNDS, 1e-4, FEW_DAMPINGS)
-        found, column = fit.values(), column_of(fit, fit.z)
-    base = fit_base(problem, blocks, column, [start_at_guess(frees, found)], ROUNDS)
-    return Calibration(family, problem, base, found, None)
+    family, found, column = regulator_of(problem, family, blocks)
+    problem = dataclasses.replace(problem, simulate=family.simulate, tie=family.tie)
+    start = start_at_guess(family.base(), dict(found))
+    base = fit_base(problem, blocks, column, [start], ROUNDS)
+    return Calibration(family, problem, base, dict(found), None)

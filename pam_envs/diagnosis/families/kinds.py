@@ -11,6 +11,9 @@ from pam_envs.wording import near
 KINDS = {
     "single_muscle": "MuscleKind",
     "antagonistic_joint": "JointKind",
+    "elbow_orthosis": "ElbowKind",
+    "knee_orthosis": "KneeKind",
+    "redundant_manipulator": "ArmKind",
 }
 """Class of each family that can be diagnosed, in the module of its name."""
 

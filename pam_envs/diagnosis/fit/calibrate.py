@@ -184,8 +184,7 @@ def regulator(
             limits += [frees_for(family, form, values) for values in form.starts]
     fits = [Fit.at_start((*order, *limit), family.column) for order in orders for limit in limits]
     only = of_pressure(problem)
-    evaluate(only, fits)
-    chosen = _simplest(only, blocks, fits)
+    chosen = simplest(only, blocks, fits)
     if "regulator.pilot_lag" in chosen.values():
         pilot = {name: chosen.values()[name] for name in PILOT}
         family = dataclasses.replace(family, plant=family.plant.replace(pilot))
@@ -228,15 +227,16 @@ def orifices(
         frees = start_at_guess(regulator_of(other), begin)
         fits += [Fit.at_start(frees, column_with(other, known)) for known in ({}, law)]
     only = dataclasses.replace(of_pressure(problem), simulate=other.simulate, tie=other.tie)
-    flow = _simplest(only, blocks, promising(only, fits), FLOW_ROUNDS)
+    flow = simplest(only, blocks, promising(only, fits), FLOW_ROUNDS)
     before = blocks.errors(only.rows(fit.residual))
     if blocks.gain(before, blocks.errors(only.rows(flow.residual))) < FLOW_GAIN:
         return family, fit
     return other, flow
 
 
-def _simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
+def simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
     """Return the best of some fits; one with more parameters needs a gain."""
+    evaluate(problem, [fit for fit in fits if not len(fit.residual)])
     improve(problem, fits, RACE, 1e-4, FEW_DAMPINGS)
     improve(problem, near(fits), rounds - RACE, 1e-4, FEW_DAMPINGS)
     errors = [blocks.errors(problem.rows(fit.residual)) for fit in fits]

@@ -309,6 +309,8 @@ def near(fits: Sequence[Fit]) -> list[Fit]:
 
 def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:
     """Compute residual and cost of fits at their present coordinates."""
+    if not fits:
+        return
     columns = np.array([column_of(f, f.z) for f in fits])
     found = problem.residuals(columns)
     for k, fit in enumerate(fits):

@@ -10,11 +10,17 @@ from pam_envs.arrays import Array
 from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.mechanics.serial_chain.kernels import N_STAGES, parameter_rows
 from pam_envs.plants.antagonistic_joint.pair import advance, command
+from pam_envs.plants.antagonistic_joint.rollout import FROM_THEM
 from pam_envs.plants.core.rollout import Loop, drives_of, loop_for, run, start_hysteresis
 from pam_envs.plants.core.rows import signal_rows
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
-from pam_envs.plants.redundant_manipulator.step import begin_lane, replacements, work_rows
+from pam_envs.plants.redundant_manipulator.step import (
+    begin_filled,
+    begin_lane,
+    replacements,
+    work_rows,
+)
 
 JOINT_OUTPUTS = signal_rows(M, "angle velocity torque stiffness")
 MUSCLE_OUTPUTS = signal_rows(M, "pressure set_point force contraction lag")
@@ -23,7 +29,7 @@ MUSCLE_OUTPUTS = signal_rows(M, "pressure set_point force contraction lag")
 
 @kernel
 def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
-    """Write the inputs of one lane: payload, prestress, commands, then disturbances."""
+    """Write the inputs of one lane, in the order of :func:`channels_of`."""
     rows[M.PAYLOAD][j] = drives[0][t][column]
     for k in range(N_STAGES):
         rows[M.DISTURBANCE + k][j] = drives[2 + N_STAGES + k][t][column]
@@ -31,6 +37,9 @@ def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> No
             rows, fixed, j, drives[2 + k][t][column], drives[1][t][column], M.COMMAND + k,
             M.PRESTRESS + k, M.SET_POINT + 2 * k,
         )  # fmt: skip
+    if drives[2 + 4 * N_STAGES][t][column] > 0.0:
+        for m in range(2 * N_STAGES):
+            rows[M.SET_POINT + m][j] = drives[2 + 2 * N_STAGES + m][t][column]
 
 
 @kernel
@@ -38,17 +47,24 @@ def begin(
     rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, drives: Any, t: int, first: int,
     elements: int, work: Any,
 ) -> None:  # fmt: skip
-    """Bring a tile to rest under its commands, from a straight virgin state."""
+    """Bring a tile to rest under its commands, or pressures, from a straight virgin state."""
     for j in range(LANES):
         start_hysteresis(rows, counts, M.END, j)
-        begin_lane(rows, fixed, counts, table, M.END, elements, j, work)
+        if drives[2 + 4 * N_STAGES][t][min(first + j, len(drives[0][0]) - 1)] == FROM_THEM:
+            for k in range(N_STAGES):
+                rows[M.COMMAND + k][j] = 0.0
+            begin_filled(rows, fixed, counts, table, M.END, elements, j, work)
+        else:
+            begin_lane(rows, fixed, counts, table, M.END, elements, j, work)
 
 
 def channels_of(plant: RedundantManipulator) -> dict[str, float]:
-    """Return the inputs of the arm, with defaults."""
-    joints = range(plant.stages)
+    """Return the inputs of the arm, with defaults; ``direct`` above 0: pressures are given."""
+    # direct = 2: the arm also begins at rest at the given pressures
+    joints, muscles = range(plant.stages), range(2 * plant.stages)
     commands = [*(f"command_{k}" for k in joints), *(f"disturbance_{k}" for k in joints)]
-    return {"payload": 0.0, "prestress": plant.prestress} | dict.fromkeys(commands, 0.0)
+    names = (*commands, *(f"pressure_{m}" for m in muscles), "direct")
+    return {"payload": 0.0, "prestress": plant.prestress} | dict.fromkeys(names, 0.0)
 
 
 def outputs_of(plant: RedundantManipulator) -> tuple[str, ...]:
@@ -115,7 +131,8 @@ def simulate_manipulator(
     stress = plant.prestress if prestress is None else prestress
     shoves = np.broadcast_to(np.asarray(disturbance, float), (periods, n))
     masses = np.broadcast_to(np.asarray(payload, float), (periods,))
-    drives = drives_of([masses, stress, *given.T, *shoves.T])
+    unused = [0.0] * (2 * n + 1)  # pressures, and whether they are given
+    drives = drives_of([masses, stress, *given.T, *shoves.T, *unused])
     loop = loop_of(plant, plant.extended)
     made = run(loop, plant, plant.parameter_rows()[None], drives, lanes=1, compiled=compiled)
     split = len(JOINT_OUTPUTS) * n

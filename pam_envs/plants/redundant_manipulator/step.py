@@ -130,13 +130,26 @@ def begin_lane(
     The arm comes there from a straight virgin state; commands, disturbances, payload, member and a
     cleared hysteresis (:func:`start_hysteresis`) are set before.
     """
+    for k in range(N_STAGES):
+        asked, stress, a = rows[M.COMMAND + k][j], rows[M.PRESTRESS + k][j], 2 * k
+        command(rows, fixed, j, asked, stress, M.COMMAND + k, M.PRESTRESS + k, M.SET_POINT + a)
+    begin_filled(rows, fixed, counts, table, state, elements, j, work)
+
+
+@routine
+def begin_filled(
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, j: int, work: Any
+) -> None:
+    """Bring one lane to rest at its setpoints [Pa], as :func:`begin_lane`.
+
+    The search for the pose at rest starts at the commanded angles.
+    """
     straight, _, _ = lever_of(fixed, j, 0.0, 1.0)
     rows[M.STRAIGHT][j] = straight
     factor = fixed[M.ARM_MASS_FACTOR][j]
     rows[M.SHARE][j] = rows[M.PAYLOAD][j] / factor
     for k in range(N_STAGES):
-        asked, stress, a = rows[M.COMMAND + k][j], rows[M.PRESTRESS + k][j], 2 * k
-        command(rows, fixed, j, asked, stress, M.COMMAND + k, M.PRESTRESS + k, M.SET_POINT + a)
+        a = 2 * k
         rows[M.PRESSURE + a][j], rows[M.PRESSURE + a + 1][j] = (
             rows[M.SET_POINT + a][j],
             rows[M.SET_POINT + a + 1][j],

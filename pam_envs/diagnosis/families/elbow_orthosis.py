@@ -1,0 +1,121 @@
+"""Elbow orthosis as a diagnosable plant: angle, both pressures, torque and forces."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pam_envs.arrays import Array
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis.families.adapted import with_bearing
+from pam_envs.diagnosis.families.antagonistic_joint import PAIRS, TITLES, difference_of
+from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
+from pam_envs.diagnosis.plant_protocol import Signals
+from pam_envs.plants.elbow_orthosis import rows as K
+from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
+
+BUNDLE: dict[str, dict[str, Any]] = {
+    "passive_each": {"scale": 20.0, "prior": 60.0},
+    "pressure_each": {"log": True, "prior": 1.5},
+    "largest_contraction": {"scale": 5e-3, "prior": 20.0},
+}
+"""Settings of the fit of a bundle's parameters: ``k0``, ``k1``, and where the force ends."""
+SETTINGS: dict[str, dict[str, Any]] = {
+    **REGULATOR,
+    **{f"bundle_{side}.{name}": how for side in "ab" for name, how in BUNDLE.items()},
+    "hysteresis.loop": {"log": True, "low": 1e-4, "prior": 1.5},
+    "link.damping": {"log": True, "low": 1e-3, "prior": 1.5},
+    "link.inertia": {"log": True, "prior": 0.7},
+    "link.mass": {"log": True, "prior": 0.7},
+    "wearer.stiffness": {"log": True, "prior": 1.5},
+    "wearer.damping": {"log": True, "prior": 1.5},
+}
+"""Base parameters with the settings of their fits. Both bundles are apart from each other, so that
+a difference between them is no cause."""
+FACTORS = {
+    ("m", "rad"): 32.0,
+    ("m/s", "rad/s"): 32.0,
+}
+"""Usual sizes of the elbow over those of a muscle, by their units: a pulley of 31.5 mm."""
+BREAKS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
+"""Breakaway torques [N m] at which the search for a sticking bearing begins."""
+
+
+class BoundElbow(RegulatedFamily):
+    """Orthosis with the inputs of a recording."""
+
+    channels: ClassVar[tuple[str, ...]] = (
+        *("angle", "pressure_a", "pressure_b", "torque", "force_a", "force_b"),
+    )
+    settings: ClassVar[Mapping[str, Mapping[str, Any]]] = SETTINGS
+    pairs: ClassVar[Mapping[str, str]] = PAIRS
+
+    def tie(self, columns: Array) -> None:
+        """Complete the largest lag of the hysteresis, to which ``hysteresis.loop`` refers."""
+        n, first = self.elements, self._weights
+        if n:
+            thresholds = np.array(self.plant.hysteresis.operator.thresholds)
+            columns[:, K.LARGEST_LAG] = columns[:, first : first + n] @ thresholds
+
+    def signals(self, recording: Recording, outputs: Array) -> Signals:
+        """Return the angle and the difference of the pressures, positive in flexion."""
+        found = difference_of(self, recording, outputs)
+        flexing = np.array([[1.0], [-1.0]]) * found.outputs
+        return Signals(
+            found.drive, -found.command, flexing, found.load, label=found.label, scale=found.scale
+        )
+
+
+class ElbowKind(RegulatedKind):
+    """Elbow orthosis with two bundles of muscles and proportional valves."""
+
+    plant = ElbowOrthosis
+    bound = BoundElbow
+    sizes: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "rest_length": ("bundle_a.nominal_length", "bundle_b.nominal_length"),
+        "diameter": ("bundle_a.diameter", "bundle_b.diameter"),
+    }
+    renamed = ({"position": "angle", "mass": "link"},)
+    factors = FACTORS
+    titles = TITLES
+    catalogue = with_bearing("link", BREAKS)
+
+    def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundElbow:
+        """Return an orthosis with the inputs of a recording; ValueError with on/off valves."""
+        if plant.valves == "on_off":
+            raise ValueError(
+                "valves = 'on_off' take pulses, which a recording does not hold; leave the columns "
+                "pressure_command_a_bar and pressure_command_b_bar out, so that the measured "
+                "pressures drive the replay, and take valves = 'proportional'"
+            )
+        bound: BoundElbow = super().bind(plant, recording, sheet)
+        return bound
+
+    def drives(
+        self, plant: Any, recording: Recording, set_points: Sequence[Array]
+    ) -> Mapping[str, Array]:
+        """Return setpoints, pressures at the start, and the motion that the wearer intends."""
+        a, b = set_points
+        start = {"start_a": np.maximum(0.0, a), "start_b": np.maximum(0.0, b)}
+        return {"command_a": a, "command_b": b} | start | intended(plant, recording)
+
+
+def intended(plant: ElbowOrthosis, recording: Recording) -> dict[str, Array]:
+    """Return the pose [rad] that the wearer intends, with its rate and acceleration.
+
+    Unless it was recorded, it is the mean angle: an arm held relaxed where the motion is.
+    """
+    pose = recording.inputs.get("intent")
+    if pose is None:
+        angle = recording.outputs.get("angle")
+        mean = plant.pulley.middle if angle is None else float(np.mean(angle))
+        return {"intent": np.full(len(recording.time), mean)}
+    rate, acceleration = np.zeros(len(pose)), np.zeros(len(pose))
+    edges = [*np.flatnonzero(recording.restart), len(pose)]
+    for a, b in pairwise(edges):
+        if b - a > 1:
+            rate[a:b] = np.gradient(pose[a:b], recording.period)
+            acceleration[a:b] = np.gradient(rate[a:b], recording.period)
+    return {"intent": pose, "intent_rate": rate, "intent_acceleration": acceleration}

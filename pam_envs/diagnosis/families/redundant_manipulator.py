@@ -1,0 +1,93 @@
+"""Redundant manipulator as a diagnosable plant: angles, pressures, torques and forces.
+
+All joints have the same muscles and regulators, and so the same causes. An arm of other joints than
+the default's is given as a plant.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR, GRAVITY
+from pam_envs.data.recording.channels import arm_channels
+from pam_envs.data.recording.recording import Recording
+from pam_envs.diagnosis.causes import catalogue
+from pam_envs.diagnosis.families.antagonistic_joint import FACTORS, MUSCLES, TITLES, UNEQUAL
+from pam_envs.diagnosis.families.regulated import RegulatedFamily, RegulatedKind
+from pam_envs.diagnosis.plant_protocol import Signals
+from pam_envs.plants.antagonistic_joint.rollout import FROM_THEM
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
+from pam_envs.plants.redundant_manipulator.rollout import JOINT_OUTPUTS, MUSCLE_OUTPUTS
+
+SETTINGS: dict[str, dict[str, Any]] = MUSCLES | {
+    "arm.mass_factor": {"log": True, "prior": 0.7},
+    "arm.damping_factor": {"log": True, "low": 1e-2, "prior": 1.5},
+}
+"""Base parameters with the settings of their fits."""
+
+
+class BoundArm(RegulatedFamily):
+    """Arm with the inputs of a recording."""
+
+    settings: ClassVar[Mapping[str, Mapping[str, Any]]] = SETTINGS
+
+    @cached_property
+    def channels(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the outputs."""
+        return tuple(c.name for c in arm_channels(self.plant.stages).outputs)
+
+    @cached_property
+    def pairs(self) -> Mapping[str, str]:  # type: ignore[override]
+        """Name of each setpoint to that of its pressure."""
+        return arm_channels(self.plant.stages).measured
+
+    def signal_rows(self) -> Mapping[str, int]:
+        """Return the row of state of each torque and force."""
+        n = self.plant.stages
+        torques = {f"torque_{k}": JOINT_OUTPUTS["torque"] + k for k in range(n)}
+        return torques | {f"force_{m}": MUSCLE_OUTPUTS["force"] + m for m in range(2 * n)}
+
+    def signals(self, recording: Recording, outputs: Array) -> Signals:
+        """Return angle and difference of pressures of the joint whose pressures move most."""
+        commands = self.setpoints(recording)
+        apart = [a - b for a, b in zip(commands[::2], commands[1::2], strict=True)]
+        k, n = int(np.argmax([np.ptp(v) for v in apart])), self.plant.stages
+        first = n + 2 * k
+        load = recording.inputs.get("payload", np.zeros(len(recording.time))) * GRAVITY
+        return Signals(
+            "pressure_difference",
+            apart[k],
+            np.array([outputs[k], outputs[first] - outputs[first + 1]]),
+            load,
+            label=f"pressure difference of joint {k} [bar]",
+            scale=BAR,
+        )
+
+
+class ArmKind(RegulatedKind):
+    """Arm of joints between antagonistic muscles."""
+
+    plant = RedundantManipulator
+    bound = BoundArm
+    sizes: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "rest_length": ("muscle.rest_length",),
+        "diameter": ("muscle.diameter",),
+    }
+    renamed = ({"position": "angle", "mass": "link"},)
+    factors = FACTORS
+    titles = TITLES
+    catalogue = (*catalogue(), UNEQUAL)
+
+    def pairs_of(self, plant: Any) -> Mapping[str, str]:
+        """Return the name of each setpoint and that of its pressure."""
+        return arm_channels(plant.stages).measured
+
+    def drives(
+        self, plant: Any, recording: Recording, set_points: Sequence[Array]
+    ) -> Mapping[str, Array]:
+        """Return the pressures, at which the arm also begins at rest."""
+        named = {f"pressure_{m}": values for m, values in enumerate(set_points)}
+        return named | {"direct": np.full(len(recording.time), FROM_THEM)}

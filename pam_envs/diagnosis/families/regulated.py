@@ -1,0 +1,232 @@
+"""Plants whose muscles have pressure regulators, replayed from setpoints or measured pressures."""
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pam_envs.arrays import Array
+from pam_envs.constants import BAR
+from pam_envs.data.recording.channels import WIRINGS
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis.audit.audit import Audit, audit_channels
+from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.families.adapted import adapted
+from pam_envs.diagnosis.families.compiled import (
+    CompiledFamily,
+    calibrate_compiled,
+    one_ahead,
+    shut_off,
+    with_measured_drive,
+)
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.calibrate import Calibration
+from pam_envs.diagnosis.fit.starting_values import Grid
+from pam_envs.diagnosis.plant_protocol import Output
+from pam_envs.plants.core.rollout import drives_of
+from pam_envs.wording import near
+
+REGULATOR: dict[str, dict[str, Any]] = {
+    "regulator.gain": {"scale": 0.01},
+    "regulator.time_constant": {"log": True, "prior": 1.5},
+    "regulator.dead_time": {"scale": 0.01},
+    "regulator.slew_rate": {"log": True, "high": 1e8, "prior": 2.0},
+}
+"""Settings of the fit of a regulator's parameters."""
+FALL = 0.5 * BAR
+"""Fall of a setpoint [Pa] from which a recording shows the exhaust."""
+NOISE = {"angle": 1e-3, "pressure": 1e3, "torque": 0.02, "force": 0.5, "tension": 1.0}
+"""RMS of the noise [SI] where a recording shows none, by the first word of a channel."""
+
+
+class RegulatedFamily(CompiledFamily):
+    """Plant with the inputs of a recording; outputs are readings of sensors, and loads and torques.
+
+    ``channels`` holds names of the plant's sensors, in their order, then of further signals.
+    """
+
+    pairs: ClassVar[Mapping[str, str]]
+    """Name of each setpoint to that of its pressure."""
+
+    def signal_rows(self) -> Mapping[str, int]:
+        """Return the row of state of each signal that is no reading."""
+        return self.plant.module("rollout").OUTPUTS  # type: ignore[no-any-return]
+
+    @property
+    def loop(self) -> Any:
+        """Loop whose outputs are the channels."""
+        loop, rows = super().loop, self.signal_rows()
+        biases = self.plant.module("rollout").readings_of(self.plant)
+        places = dict(zip(biases, loop.outputs, strict=True))
+        read = [c for c in self.channels if c in places]
+        return dataclasses.replace(
+            loop,
+            name=f"{loop.name}_diagnosed",
+            kernels={**loop.kernels, "BIAS_ROWS": tuple(biases[c] for c in read)},
+            outputs=tuple(places.get(c, rows.get(c, 0)) for c in self.channels),
+        )
+
+    def setpoints(self, recording: Recording, names: Iterable[str] = ()) -> list[Array]:
+        """Return setpoints [Pa], all by default; without commands the measured pressures."""
+        return [
+            recording.inputs[s] if s in recording.inputs else recording.outputs[self.pairs[s]]
+            for s in names or self.pairs
+        ]
+
+    def unmet_needs(self, recording: Recording, sheet: Rig) -> dict[str, str]:
+        """Return the needs of causes that a recording does not meet, and why."""
+        load = recording.inputs.get("payload", np.zeros(1))
+        falls = any(np.any(np.maximum.accumulate(v) - v > FALL) for v in self.setpoints(recording))
+        moved = [c for c in self.channels if c not in self.pairs.values()]
+        weighs = "payload" in {c.name for c in WIRINGS[self.plant.family].inputs}
+        needs = self.needs_of_any(recording, sheet) | {
+            "contraction": (
+                any(c in recording.outputs for c in moved),
+                f"none of {', '.join(moved)} was recorded",
+            ),
+            "loads": (
+                np.ptp(load) > 0.05,
+                f"the payload was {float(load[0]):.3g} kg throughout"
+                if weighs
+                else "the replay of this plant has no input for a load",
+            ),
+            "exhaust": (falls, "no commanded pressure ever falls by more than 0.5 bar"),
+        }
+        return {word: reason for word, (met, reason) in needs.items() if not met}
+
+
+class RegulatedKind:
+    """Kind of plants with pressure regulators.
+
+    Attributes
+    ----------
+    plant : type
+        Class of the plant.
+    bound : type
+        Class of the plant with the inputs of a recording.
+    sizes : mapping
+        Number of a rig file (``rest_length``, ``diameter``) to the parameters that it gives.
+    renamed, factors, titles
+        Of the causes (:func:`pam_envs.diagnosis.families.adapted.adapted`), for each sensor of the
+        motion.
+    """
+
+    plant: ClassVar[Any]
+    bound: ClassVar[type[RegulatedFamily]]
+    sizes: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    renamed: ClassVar[tuple[Mapping[str, str], ...]]
+    factors: ClassVar[Mapping[tuple[str, str], float]]
+    titles: ClassVar[Mapping[str, str]] = {}
+    catalogue: ClassVar[tuple[Cause, ...]]
+    weighed: ClassVar[bool] = False
+    experiments: ClassVar[bool] = False
+
+    @property
+    def name(self) -> str:
+        """Name of the family."""
+        return str(self.plant.family)
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Outputs that a recording may hold."""
+        names = [c.name for c in WIRINGS[self.name].outputs]
+        return tuple(Output(name, NOISE[name.partition("_")[0]]) for name in names)
+
+    @property
+    def loop_reason(self) -> str:
+        """Reason why controllers are not compared."""
+        return f"controllers of a {self.name} are not compared"
+
+    def preset(self) -> Any:
+        """Return the default plant."""
+        return self.plant.paper()
+
+    def start(self, sheet: Rig) -> Any:
+        """Return the default plant with the variant and sizes of a rig, without any effect."""
+        plant = self.preset()
+        for key in sheet.variant:
+            if key not in plant.makes:
+                raise ValueError(
+                    f"RIG.yaml: variant.{key} is no choice of a {self.name}{near(key, plant.makes)}"
+                )
+        plant = dataclasses.replace(plant, **sheet.variant)
+        sizes = {**self.sizes, "max_pressure": ("regulator.max_pressure",)}
+        given = {
+            name: getattr(sheet, key)
+            for key, names in sizes.items()
+            for name in names
+            if getattr(sheet, key) is not None
+        }
+        return plant.replace({**given, **sheet.parameters})
+
+    def causes(self, asked: Sequence[Cause]) -> tuple[Cause, ...]:
+        """Return the requested causes in the plant's parameters, with forms for each sensor."""
+        plant = self.preset()
+        made: dict[str, Cause] = {}
+        for renamed in self.renamed:
+            for cause in adapted(asked, plant, renamed, self.factors, self.titles):
+                known = made.get(cause.name)
+                if known is None:
+                    made[cause.name] = cause
+                    continue
+                # searches in the residual are of the first sensor
+                more = [f for f in cause.forms if f.search is None or isinstance(f.search, Grid)]
+                new = tuple(f for f in more if f not in known.forms)
+                made[cause.name] = dataclasses.replace(known, forms=(*known.forms, *new))
+        return tuple(made.values())
+
+    def drives(
+        self, plant: Any, recording: Recording, set_points: Sequence[Array]
+    ) -> Mapping[str, Array]:
+        """Return inputs of the loop by name that are no inputs of a recording.
+
+        ``set_points`` [Pa] are below zero where the valve is shut.
+        """
+        raise NotImplementedError
+
+    def bind(self, plant: Any, recording: Recording, sheet: Rig) -> Any:
+        """Return a plant with the inputs of a recording."""
+        given, regulator = dict(recording.inputs), plant.regulator
+        pairs = self.pairs_of(plant)
+        measured = not set(pairs) <= set(given)
+        if measured:
+            lacking = [name for name in pairs.values() if name not in recording.outputs]
+            if lacking:
+                raise ValueError(
+                    f"the recording has neither every setpoint nor {' and '.join(lacking)}; give "
+                    + " and ".join((*pairs, *lacking))
+                )
+            given |= {s: one_ahead(recording.outputs[p], recording) for s, p in pairs.items()}
+            plant = with_measured_drive(plant, recording.period)
+        set_points = [shut_off(given[name], recording) for name in pairs]
+        usual = plant.module("rollout").channels_of(plant)
+        made = {**usual, **given, **self.drives(plant, recording, set_points)}
+        channels = [np.broadcast_to(made[name], (len(recording.time),)) for name in usual]
+        data = (plant, recording.period, drives_of(channels), recording.restart.copy())
+        return self.bound(*data, regulator if measured else None)
+
+    def pairs_of(self, plant: Any) -> Mapping[str, str]:
+        """Return the name of each setpoint and that of its pressure."""
+        return self.bound.pairs
+
+    def audit(self, recording: Recording, sheet: Rig) -> Audit:
+        """Return the findings on a recording before its diagnosis."""
+        return audit_channels(recording, sheet, self.plant.names)
+
+    def calibrate(
+        self,
+        family: Any,
+        measured: Array,
+        noise: Array,
+        blocks: Blocks,
+        time: Array,
+        shapes: Array,
+    ) -> Calibration:
+        """Fit regulators, then all base parameters."""
+        if family.measured_drive:
+            measured = measured.copy()
+            inputs = set(self.pairs_of(family.plant).values())
+            measured[[c in inputs for c in family.channels]] = np.nan  # inputs are no outputs
+        return calibrate_compiled(family, measured, noise, blocks, time, shapes)
