@@ -53,7 +53,7 @@ DISPLAY = {"contraction": ("mm", 1e-3), "pressure": ("bar", 1e5)}
 WIDTH = 100
 
 
-WITHOUT = {**SWITCHED_OFF, "muscle.braid_force": 0.0}
+WITHOUT = {**SWITCHED_OFF, "muscle.braid_force": 0.0, "muscle.area_taper": 0.0}
 """Values at which a term of the plant is absent."""
 
 

@@ -39,7 +39,10 @@ def seen(study: Any) -> list[tuple[int, str]]:
 
 
 def causes(study: Any) -> list[Json]:
-    """Return the causes of the extended plant, in the order of evidence."""
+    """Return the causes of the extended plant in the order of evidence, differences by nature last.
+
+    A muscle of another make has another law and another friction; they are no fault.
+    """
     model, problem, family, held = study.model, study.problem, study.family, study.held
     if not model.causes:
         return []
@@ -78,7 +81,8 @@ def causes(study: Any) -> list[Json]:
                 "size": size_over_noise(left, problem),
             }
         )
-    return sorted(made, key=lambda c: -c["gain"]["value"])
+    natural = {cause.name: cause.by_nature for cause, _ in model.causes}
+    return sorted(made, key=lambda c: (natural[c["name"]], -c["gain"]["value"]))
 
 
 def calibration(study: Any) -> list[Json]:

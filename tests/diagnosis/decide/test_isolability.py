@@ -111,7 +111,7 @@ def test_number_of_simulated_columns(study):
     isolability(problem, study.family, study.base.fit, catalogue())  # looks for starts
     columns.clear()
     isolability(problem, study.family, study.base.fit, catalogue())
-    assert sum(columns) <= 212
+    assert sum(columns) <= 240
 
 
 @needs_kernels
