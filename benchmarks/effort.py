@@ -114,7 +114,7 @@ def pareto_figure() -> Any:
         ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         ax.xaxis.set_major_formatter(ScalarFormatter())
         ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.margins(x=0.2, y=0.1)
+        ax.margins(x=0.2, y=0.25)
         ax.set_title(track.removeprefix("knee_").removesuffix("_nominal").replace("_", " "))
         ax.set_xlabel("RMS tracking error [N]")
         ax.spines[["top", "right"]].set_visible(False)
