@@ -92,24 +92,29 @@ def pareto_figure() -> Any:
             for row in found
         ]
         best: list[tuple[float, ...]] = []
+        names: list[str] = []
         for (error, effort), row in sorted(zip(points, found, strict=True), key=lambda p: p[0]):
             front = not best or effort < best[-1][1]
             if front:
                 best.append((error, effort))
             ax.plot(error, effort, "o", color="C0" if front else "0.6", markersize=5)
-            if front or row["controller"]["name"] in (VENTED, RANDOM):
-                name = row["controller"]["name"].removeprefix("knee_")
-                place = (4, 5) if len(best) % 2 else (4, -10)
-                ax.annotate(
-                    name, (error, effort), fontsize=7, xytext=place, textcoords="offset points"
-                )
+            name, label = row["controller"]["name"].removeprefix("knee_"), ""
+            if front:
+                label = str(len(best))
+                names.append(f"{label}  {name}")
+            elif row["controller"]["name"] in (VENTED, RANDOM):
+                label = name
+            ax.annotate(
+                label, (error, effort), fontsize=7, xytext=(4, 5), textcoords="offset points"
+            )
+        ax.text(0.03, 0.97, "\n".join(names), fontsize=7, va="top", transform=ax.transAxes)
         ax.plot(*zip(*best, strict=True), color="C0", linewidth=0.8)
         ax.axhline(1.0, color="0.3", linewidth=0.8, linestyle=":")
         ax.set_xscale("log")
         ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         ax.xaxis.set_major_formatter(ScalarFormatter())
         ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.margins(x=0.2, y=0.1)
+        ax.margins(x=0.2, y=0.25)
         ax.set_title(track.removeprefix("knee_").removesuffix("_nominal").replace("_", " "))
         ax.set_xlabel("RMS tracking error [N]")
         ax.spines[["top", "right"]].set_visible(False)

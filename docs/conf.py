@@ -7,6 +7,7 @@ work on the repository's web page. Nothing is loaded from the network.
 import os
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -59,7 +60,9 @@ if not API:
     exclude_patterns.append("docs/api/generated")
     extensions.remove("sphinx.ext.autosummary")
 
-REPOSITORY = ""  # address of the public repository, once there is one: links to the sources
+# address of the public repository, once there is one: links to the sources
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+REPOSITORY = PROJECT["tool"]["hatch"]["metadata"]["hooks"]["custom"]["repository"]
 html_theme = "furo"
 if REPOSITORY:
     html_theme_options = {

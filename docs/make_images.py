@@ -64,8 +64,8 @@ def stride(path: Path, mismatch: float = 10.0) -> None:
     walks = [knee_studies.stride("walk", mismatch, bumpless) for bumpless in (True, False)]
     records = [plots.cut(walk, 9.2, 15.4) for walk in walks]
     title = (
-        "Walking at 5 s a stride with 20 % assistance, inverse + LTR; out of charge (in swing) the"
-        f" tension's controller sees a reference that is off by {mismatch:g} N"
+        "Walking at 5 s per stride with 20 % assistance, inverse + LTR; in swing, the reference of"
+        f" the inactive tension controller is wrong by {mismatch:g} N"
     )
     titles = ("I   with bumpless transfer", "II   without")
     plots.stride_figure(records, titles, title).savefig(path, dpi=100)

@@ -1,7 +1,9 @@
 """The command line from the user's side."""
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -56,6 +58,30 @@ def test_doctor_compares_machine_code_with_plain_python(monkeypatch: pytest.Monk
     found = {finding.topic: finding for finding in doctor.first_step()}
     assert not found["machine code"].ok
     assert "differs from plain Python; delete" in found["machine code"].text
+
+
+@pytest.mark.parametrize(
+    ("cuda", "gpu", "said"),
+    [
+        ("13.0", False, "the CPU build takes a tenth of the space"),
+        ("13.0", True, "Accelerator 1"),
+        (None, False, "training runs on the CPU"),
+    ],
+)
+def test_doctor_recommends_the_cpu_build_of_torch_without_a_gpu(
+    cuda: str | None, gpu: bool, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch = SimpleNamespace(
+        __version__="2.13.0",
+        version=SimpleNamespace(cuda=cuda),
+        cuda=SimpleNamespace(is_available=lambda: gpu, get_device_name=lambda _: "Accelerator 1"),
+    )
+    monkeypatch.setitem(sys.modules, "torch", torch)
+    monkeypatch.setattr(doctor, "find_spec", lambda _: object())
+    monkeypatch.setattr("shutil.which", lambda _: None)
+    (found,) = doctor.gpu()
+    assert found.ok
+    assert said in found.text
 
 
 def test_doctor_reports_a_check_that_raises(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 HEAVY = (
     *("torch", "stable_baselines3", "matplotlib", "pygame", "imageio", "onnxruntime"),
-    *("joblib", "dask", "distributed"),
+    *("joblib", "dask", "distributed", "rich"),
 )
 """Packages that only learning, drawing and benchmarks need."""
 

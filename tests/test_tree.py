@@ -38,3 +38,9 @@ def test_imports_are_acyclic() -> None:
         if size > 1
     ]
     assert circles == []
+
+
+def test_randomize_has_one_spelling_in_the_code() -> None:
+    """Only names of tracks have the other one, because rows are identified by them."""
+    files = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")]
+    assert [path for path in files if "randomis" in path.read_text("utf-8").lower()] == []

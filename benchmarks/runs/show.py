@@ -101,13 +101,15 @@ def episode_figure(
     error.plot(t, factor * (signals["output"] - signals["reference"]), color="#d55e00")
     error.axhline(0.0, color="0.7", linewidth=0.6)
     error.set_ylabel(f"error [{unit}]")
+    for upper in (track, error):
+        upper.tick_params(labelbottom=False)
     _draw_inputs(inputs, signals, set_points)
     if "state/pressure" in signals:
         loop = figure.add_subplot(grid[:, 1])
         loop.plot(1e-5 * signals["state/pressure"], factor * signals["output"], color="#0072b2")
         loop.set_xlabel("pressure [bar]")
         loop.set_ylabel(f"output [{unit}]")
-        loop.set_title("loop")
+        loop.set_title("hysteresis loop")
     figure.suptitle(title)
     return figure
 
@@ -126,4 +128,4 @@ def _draw_inputs(axes: Any, signals: Mapping[str, Any], set_points: Mapping[str,
             axes.plot(signals["time"], pressure, color=color, linewidth=width, label=name)
     axes.set_ylabel(f"{'angle' if angles else 'pressure'} [{unit}]")
     axes.set_xlabel("time [s]")
-    axes.legend(frameon=False, ncols=3)
+    axes.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))

@@ -169,7 +169,7 @@ def variants(rounds: int) -> list[Measurement]:
         "maxwell_slip": {},
         "preisach": {"hysteresis": "preisach"},
         "none": {"hysteresis": "none"},
-        "randomised": {"randomize": True},
+        "randomized": {"randomize": True},
     }
     subjects = {
         name: stepping_batch(_batch(1024, info=False, threads=1, **kwargs), 200)

@@ -159,7 +159,7 @@ def calibrate(
     seed : int
         Seed of all random draws.
     progress : bool
-        Show a progress bar.
+        Print the stages with the time since the start to stderr.
 
     Raises
     ------

@@ -86,7 +86,7 @@ def diagnose(
     seed : int
         Seed of all random draws.
     progress : bool
-        Show a progress bar.
+        Print the stages with the time since the start to stderr.
     simulated : object, optional
         The rig itself, if it can be run (:class:`pam_envs.diagnosis.closed_loop.gain.Rig`).
     oracle : Plant or Simulated, optional

@@ -1,5 +1,7 @@
-"""Outcome of a diagnosis, its time series, and the progress bar."""
+"""Outcome of a diagnosis, its time series, and the progress of its stages."""
 
+import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -14,20 +16,15 @@ from pam_envs.arrays import Array
 
 @contextmanager
 def steps(progress: bool) -> Iterator[Callable[[str], None]]:
-    """Provide a function that shows the present stage."""
-    if not progress:
-        yield lambda text: None
-        return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    """Provide a function that prints the present stage and the time since the start."""
+    started = time.monotonic()
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, transient=True) as bar:
-        task = bar.add_task("reading", total=7)
+    def step(text: str) -> None:
+        minutes, seconds = divmod(round(time.monotonic() - started), 60)
+        if progress:
+            print(f"{minutes}:{seconds:02}  {text}", file=sys.stderr, flush=True)
 
-        def step(text: str) -> None:
-            bar.update(task, description=text, advance=1)
-
-        yield step
+    yield step
 
 
 @dataclass(frozen=True)

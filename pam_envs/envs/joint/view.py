@@ -143,10 +143,12 @@ def angle_ticks(plant: Any) -> range:
 
 
 class JointIntegral:
-    """Angle setpoints: reference, shift by the declared weight, slow integral of the error."""
+    """Angle setpoints: reference, shift by the declared weight, integral of small errors."""
 
     gain = 0.03
     """Integral gain per control period."""
+    band = math.radians(4.0)
+    """Error [rad] above which the integral is held, so that it does not wind up at steps."""
 
     def __init__(self, env: Any) -> None:
         self.plant, self.signals, self.actions = env.plant, env.signals, env.action_signals
@@ -161,7 +163,8 @@ class JointIntegral:
         read = self.signals.decode
         references = np.array([float(read(observation, name)) for name in self.references])
         angles = np.array([float(read(observation, name)) for name in self.angles])
-        self.integral = self.integral + self.gain * (references - angles)
+        errors = references - angles
+        self.integral = self.integral + np.where(np.abs(errors) < self.band, self.gain * errors, 0)
         shift = self.plant.gravity_shift(references, float(read(observation, "payload")))
         values = references + shift + self.integral
         encoded = [s.encode(v) for s, v in zip(self.actions, values, strict=True)]

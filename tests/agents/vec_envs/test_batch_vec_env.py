@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from short_runs import ID
+from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
+from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecMonitor
 
 from agents.vec_envs.batch import BatchVecEnv, make_batch_vec_env
@@ -25,6 +27,16 @@ def test_single_environment_passes_the_checker_without_a_warning():
         warnings.simplefilter("error")
         check_env(gym.make(ID).unwrapped)
         check_env(gym.make(ID, normalize=True, reference="mixed", load=None).unwrapped)
+
+
+def test_stable_baselines_trains_on_environments_made_by_id():
+    """The way of rl-zoo3."""
+    envs = make_vec_env(ID, n_envs=2, seed=0, env_kwargs=SHORT)
+    model = PPO("MlpPolicy", envs, n_steps=32, batch_size=32, n_epochs=1, seed=0, device="cpu")
+    before = model.policy.state_dict()["mlp_extractor.policy_net.0.weight"].clone()
+    model.learn(64)
+    assert model.num_timesteps == 64
+    assert not before.equal(model.policy.state_dict()["mlp_extractor.policy_net.0.weight"])
 
 
 def test_rows_equal_batched_and_single_environments():
