@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import functools
 import hashlib
+import itertools
 import json
 import lzma
 import os
@@ -219,36 +220,46 @@ def actions(number: int) -> Iterator[tuple[str, int, Counter[Outcome]]]:
 
 
 def states(number: int, folder: Path) -> Iterator[tuple[str, int, Counter[Outcome]]]:
-    """Yield how single changed numbers of states and of checkpoints end, with steps after them."""
+    """Yield how single changed numbers of states and of checkpoints end, with steps after them.
+
+    Then the same for changes whose author makes a new digest, which only have to crash nothing.
+    """
     import gymnasium as gym
 
+    from pam_envs.envs.core.saved_state import sealed
+    from tests.agents import short_runs
     from tests.envs.cases import IDS
 
     each = -(-number // (len(IDS) + 1))
-    for name in IDS:
+    for name, anew in itertools.product(IDS, (False, True)):
         env: Any = gym.make(name).unwrapped
         env.reset(seed=3)
         env.step(np.zeros(env.action_space.shape))
         state = env.get_state()
         draws = np.random.default_rng(IDS.index(name))
 
-        def act(_: int, env: Any = env, state: Any = state, draws: Any = draws) -> Outcome:
-            key = str(draws.choice(sorted(state)))
+        def act(
+            _: int, env: Any = env, state: Any = state, draws: Any = draws, anew: bool = anew
+        ) -> Outcome:
+            key = str(draws.choice(sorted(key for key in state if state[key].size)))
             changed = state[key].copy()
             place = tuple(int(draws.integers(n)) for n in changed.shape)
-            changed[place] = tampered(changed[place], draws)
-            if np.array_equal(changed, state[key], equal_nan=True):
-                return "refused"  # nothing was changed
+            while np.array_equal(changed, state[key], equal_nan=True):
+                changed[place] = tampered(changed[place], draws)
+            given = {**state, key: changed}
             try:
-                env.set_state({**state, key: changed})
+                env.set_state(sealed(given) if anew else given)
             except ValueError:
                 return "refused"
             for _ in range(3):
                 env.step(np.zeros(env.action_space.shape))
-            return f"finite number of '{key}' accepted"
+            return "digest made anew, accepted" if anew else f"changed '{key}' accepted"
 
-        yield name, each, isolated(each, act)
-    yield "checkpoint.pt", each, checkpoints(each, folder)
+        yield f"{name}{', digest made anew' if anew else ''}", each, isolated(each, act)
+    short_runs.trained(folder / "trained", short_runs.tiny(steps=256))
+    for anew in (False, True):
+        name = f"checkpoint.pt{', digest made anew' if anew else ''}"
+        yield name, each, checkpoints(each, folder, anew)
 
 
 def tampered(value: Any, draws: np.random.Generator) -> Any:
@@ -263,15 +274,13 @@ def tampered(value: Any, draws: np.random.Generator) -> Any:
     return max(bounds.min, min(bounds.max, int(np.nan_to_num(chosen, posinf=2**62))))
 
 
-def checkpoints(number: int, folder: Path) -> Counter[Outcome]:
-    """Return how checkpoints with one changed number and a new checksum end."""
+def checkpoints(number: int, folder: Path, anew: bool) -> Counter[Outcome]:
+    """Return how checkpoints with one changed number end, with the old checksum or a new one."""
     import torch
 
     from agents.training import checkpoint, train
-    from tests.agents import short_runs
 
-    short_runs.trained(folder / "trained", short_runs.tiny(steps=256))
-    good = checkpoint.load(folder / "trained/checkpoint.pt")
+    good = (folder / "trained/checkpoint.pt").read_bytes()
     draws = np.random.default_rng(0)
     target = folder / "tampered"
     target.mkdir(exist_ok=True)
@@ -279,46 +288,39 @@ def checkpoints(number: int, folder: Path) -> Counter[Outcome]:
     def act(_: int) -> Outcome:
         content = checkpoint.load(folder / "trained/checkpoint.pt")
         leaves = list(_leaves(content["snapshot"]))
-        holder, key, path = leaves[int(draws.integers(len(leaves)))]
+        holder, key = leaves[int(draws.integers(len(leaves)))]
         value = holder[key]
         if isinstance(value, torch.Tensor):
-            if not value.numel():
-                return "refused"
-            flat = value.reshape(-1)
+            flat = value.reshape(-1).clone()
             place = int(draws.integers(len(flat)))
-            new = torch.tensor(tampered(flat[place].numpy(), draws)).to(value.dtype)
-            if torch.equal(flat[place], new):
-                return "refused"
-            flat[place] = new
+            while torch.equal(flat, value.reshape(-1)):
+                new = torch.tensor(tampered(flat[place].numpy(), draws))
+                flat[place] = new.to(value.dtype)
             holder[key] = flat.reshape(value.shape)
-        elif isinstance(value, (int, float)):
-            holder[key] = tampered(value, draws)
         else:
-            holder[key] = None
-        checkpoint.save(target / "checkpoint.pt", content)
+            holder[key] = tampered(value, draws) if isinstance(value, (int, float)) else None
+        path = target / "checkpoint.pt"
+        checkpoint.save(path, content)
+        if not anew:
+            head = len(checkpoint.MARK) + 32
+            path.write_bytes(good[:head] + path.read_bytes()[head:])
         try:
-            run = train.saved_run(target)
-            model = train.resume(run)
-        except ValueError:
-            return "refused"
-        try:
+            model = train.resume(train.saved_run(target))
             model.learn(64, reset_num_timesteps=False)
-        except ValueError:  # torch finds an action that is not finite; a sentence for the user
+        except ValueError:  # of learning, where torch finds an action that is not finite
             return "refused"
-        return f"finite number of '{path}' accepted"
+        return "digest made anew, accepted" if anew else "changed number accepted"
 
-    assert good
     return isolated(number, act)
 
 
-def _leaves(value: Any, path: str = "") -> Iterator[tuple[Any, Any, str]]:
-    items = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, entry in items:
-        place = path or str(key)
+def _leaves(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield the holders and keys of all numbers and tensors that are not empty."""
+    for key, entry in value.items() if isinstance(value, dict) else enumerate(value):
         if isinstance(entry, (dict, list)):
-            yield from _leaves(entry, place)
-        else:
-            yield value, key, place
+            yield from _leaves(entry)
+        elif entry is not None and getattr(entry, "shape", (1,)) != (0,):
+            yield value, key
 
 
 def cache(number: int, folder: Path) -> Counter[Outcome]:
