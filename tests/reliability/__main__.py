@@ -20,11 +20,14 @@ for name, value in (
 import tyro  # noqa: E402
 
 TESTS = Path(__file__).parents[1]
-DEFAULTS = {"actions": 10_000, "files": 11_000, "states": 1000, "cache": 1000, "commands": 100}
+DEFAULTS = {
+    **{"actions": 10_000, "files": 11_000, "states": 1000, "board": 1000, "cache": 1000},
+    "commands": 100,
+}
 FORGERIES = ("runs/test_verify.py", "runs/test_rows.py", "runs/test_store.py", "identity", "board")
-FINE = ("read", "refused", "accepted", "digest made anew, accepted")
+FINE = ("read", "refused", "accepted", "shown, not as verified", "digest made anew, accepted")
 """Outcomes of a file, state or action that are as they should be."""
-What = Literal["actions", "files", "states", "forgeries", "cache", "commands"]
+What = Literal["actions", "files", "states", "board", "forgeries", "cache", "commands"]
 
 
 def main(
@@ -57,7 +60,8 @@ def main(
             return _counted(hostile.files(folder, number))
         if what == "actions":
             return _counted(hostile.actions(number))
-        return _counted(hostile.states(number, folder))
+        act = hostile.board if what == "board" else hostile.states
+        return _counted(act(number, folder))
 
 
 def _counted(found: Iterable[tuple[str, int, Counter[str]]]) -> int:

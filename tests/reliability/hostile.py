@@ -1,6 +1,7 @@
 """Hostile files, tampered states and drawn actions in bulk, each kind in a process of its own."""
 
 import contextlib
+import copy
 import dataclasses
 import functools
 import hashlib
@@ -10,6 +11,7 @@ import lzma
 import os
 import random
 import resource
+import shutil
 import signal
 import sys
 from collections import Counter
@@ -180,6 +182,79 @@ def files(folder: Path, number: int) -> Iterator[tuple[str, int, Counter[Outcome
             return "read"
 
         yield kind.name, len(contents), isolated(len(contents), act)
+
+
+# --- rows of the board ---------------------------------------------------------------------------
+
+
+def board(number: int, folder: Path) -> Iterator[tuple[str, int, Counter[Outcome]]]:
+    """Yield how boards and sites of rows end of which one was changed and has a new checksum.
+
+    The committed verifications count as those of the folder, so that a row without a new checksum,
+    or with an unnoticed change, would be shown as verified.
+    """
+    from benchmarks.board import accessors, leaderboard, site
+    from benchmarks.runs import rows, store, verified
+
+    track = "elbow_nominal"
+    shutil.copytree(rows.RESULTS / track, folder / track)
+    for path in sorted((folder / track).iterdir())[3:]:
+        path.unlink()
+    found = verified.committed(rows.RESULTS)
+    verified.committed = lambda _: found  # type: ignore[assignment]
+    path = rows.files(folder)[0]
+    good = store.read_json(path)
+    assert all(row[accessors.VERIFIED] for row in leaderboard.load(folder))
+
+    def act(i: int) -> Outcome:
+        draws = random.Random(i)
+        changed = copy.deepcopy(good)
+        while store.comparable(changed) == store.comparable(good):
+            alter(changed, draws)
+        if draws.random() < 0.9:
+            changed = store.seal(changed)
+        path.write_bytes(lzma.compress(json.dumps(changed).encode(), preset=0))
+        try:
+            loaded = leaderboard.load(folder)
+            leaderboard.files(loaded)
+            site.page(loaded)
+        except ValueError as error:
+            return "refused" if rows.name_of(path) in str(error) else f"no name in: {error}"
+        (row,) = (row for row in loaded if row["row"] == good["row"])
+        return "shown as verified" if row[accessors.VERIFIED] else "shown, not as verified"
+
+    yield "rows", number, isolated(number, act)
+
+
+STRANGE: tuple[Any, ...] = (
+    *(None, True, -1, 0, 2**70, 1e300, -1e-300, "", "<b>", "\x1b[1m", "x" * 9999, "../../x"),
+    *([], {}, [[]], {"": 0}),
+)
+"""Values in place of one of a row."""
+
+
+def alter(record: Any, draws: random.Random) -> None:
+    """Change, remove, double or exchange one of the values of nested lists and mappings."""
+    held = record
+    while True:
+        keys = list(held) if isinstance(held, dict) else range(len(held))
+        key = draws.choice(list(keys))
+        if not isinstance(held[key], (dict, list)) or not held[key] or draws.random() < 0.1:
+            break
+        held = held[key]
+    kind, other = draws.randrange(5), draws.choice(list(keys))
+    if kind == 0:
+        del held[key]
+    elif kind == 1 and isinstance(held, dict):
+        held[f"{key}_more"] = held[key]
+    elif kind == 1:
+        held.append(held[key])
+    elif kind == 2:
+        held[key], held[other] = held[other], held[key]
+    elif kind == 3 and isinstance(held[key], (int, float)):
+        held[key] *= draws.choice([1 - 1e-5, 0.5, -1, 1e9])
+    else:
+        held[key] = draws.choice(STRANGE)
 
 
 # --- actions, states, checkpoints, cache ---------------------------------------------------------

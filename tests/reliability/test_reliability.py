@@ -26,7 +26,7 @@ def test_kills_interrupts_and_full_disks_lose_no_result() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")
-@pytest.mark.parametrize("what", ["files", "states"])
+@pytest.mark.parametrize("what", ["files", "states", "board"])
 def test_hostile_content_is_refused_in_bounded_time(what: str) -> None:
     pytest.importorskip("stable_baselines3")
     assert "\n0 not as they should be" in attack(what, "--number", "90")
