@@ -219,7 +219,8 @@ def board(number: int, folder: Path) -> Iterator[tuple[str, int, Counter[Outcome
             leaderboard.files(loaded)
             site.page(loaded)
         except ValueError as error:
-            return "refused" if rows.name_of(path) in str(error) else f"no name in: {error}"
+            named = good["controller"]["name"] in str(error)
+            return "refused" if named else "no name in the message"
         (row,) = (row for row in loaded if row["row"] == good["row"])
         return "shown as verified" if row[accessors.VERIFIED] else "shown, not as verified"
 
