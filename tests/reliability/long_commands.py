@@ -269,6 +269,38 @@ def _tuned(folder: Path) -> Results:
     }
 
 
+def _search(folder: Path) -> int:
+    from agents import __main__ as agents
+    from agents.search import spaces, tune
+    from agents.settings import presets
+
+    def sizes(job: Any, trial: Any) -> float:
+        """Return a fake value of a trial, from its settings alone."""
+        values = spaces.suggest(trial, job.config).values()
+        return float(sum(value for value in values if isinstance(value, (int, float))))
+
+    known = tune.objective, presets.preset_path
+    tune.objective, presets.preset_path = sizes, lambda *_: folder / "preset.yaml"
+    try:
+        given = ("--trials", 3, "--steps", 256, "--storage", folder / "search.db", "--write")
+        return _cli(agents, "tune", "PAM/MusclePositioning-v0", *given)
+    finally:
+        tune.objective, presets.preset_path = known
+
+
+def _copy_preset(folder: Path) -> None:
+    from agents.settings import presets
+
+    shutil.copy(presets.preset_path("PAM/MusclePositioning-v0", "ppo"), folder / "preset.yaml")
+
+
+def _preset(folder: Path) -> Results:
+    from agents.settings import presets
+
+    presets.read(folder / "preset.yaml")
+    return {"preset.yaml": digest(folder / "preset.yaml")}
+
+
 @cache
 def _readings() -> Any:
     """Return the diagnosis of the shipped readings, computed once."""
@@ -320,6 +352,7 @@ COMMANDS = (
     Command("train", _train, _policy),
     Command("sweep", _sweep, _policy),
     Command("tune", _tune, _tuned, _copy_tuned),
+    Command("search", _search, _preset, _copy_preset),  # agents tune
     Command(
         "diagnose", _diagnose, lambda f: {"": digest(f / "diagnosis")}, _older_diagnosis, _readings
     ),
