@@ -149,14 +149,20 @@ def played(name: str) -> dict[str, Any]:
     return episode
 
 
+REFUSALS = "PermissionError|ModuleNotFoundError|CalledProcessError"
+REACHED = {
+    "salts": ("salts", "history", "child", "network"),
+    "scoring": ("metrics", "rewriting", "writing", "memory", "signal"),
+}
+
+
 @pytest.mark.skipif(not confined(), reason="no Landlock")
-def test_controller_reaches_no_salt_metric_file_or_process(evil: Path) -> None:
+@pytest.mark.parametrize("what", REACHED)
+def test_confined_controller_reaches_no(what: str, evil: Path) -> None:
     said = played("evil")["failure"]
     assert said.startswith("ValueError: ")
-    for name in ("salts", "history", "metrics", "rewriting", "writing", "memory", "signal"):
-        assert re.search(rf"\b{name}=(PermissionError|ModuleNotFoundError)", said), (name, said)
-    for name in ("network", "child"):
-        assert re.search(rf"\b{name}=(PermissionError|CalledProcessError)", said), (name, said)
+    for name in REACHED[what]:
+        assert re.search(rf"\b{name}=({REFUSALS})", said), (name, said)
     assert [path.name for path in evil.iterdir()] == ["theirs.py"]
 
 
