@@ -31,8 +31,8 @@ $(READY): pyproject.toml constraints.txt
 	@mkdir -p $(VENV) && rm -f $(READY) && touch $(VENV)/.begun
 	@echo "Making $(VENV); the first time takes some minutes"
 	@$(PYTHON) -m venv $(VENV)
-	@$(INSTALL) "$$(grep '^torch==' constraints.txt)"
 	@if test -n "$(HASHES)"; then $(INSTALL) --require-hashes --no-deps --requirement requirements.lock; fi
+	@$(INSTALL) "$$(grep '^torch==' constraints.txt)"
 	@$(INSTALL) --editable ".[$(EXTRAS)]" --constraint constraints.txt
 	@mv $(VENV)/.begun $(READY)
 
