@@ -2,10 +2,12 @@
 
 PYTHON ?= python3
 JOBS ?= 2
+HASHES ?= # 1: install only files whose hashes are in requirements.lock, torch aside
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 EXTRAS := plot,data,formats,baselines,agents,bench,export,rig,cluster,dev
+COMMA := ,
 INSTALL := $(BIN)/python -m pip --disable-pip-version-check --no-input install -qq
 PLAIN := tests/hysteresis tests/kernels tests/plants/test_golden_plants.py $(addprefix tests/envs/, core/test_bits.py core/test_everyday.py core/test_own_family.py test_golden_trajectories.py)
 
@@ -16,7 +18,7 @@ export SDL_VIDEODRIVER ?= dummy
 
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help venv benchmark test lint format types layers check audit licences images docs docs-check wheel install-check clean
+.PHONY: help venv benchmark test lint format types layers check audit hashes licences images docs docs-check wheel install-check clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
@@ -29,6 +31,7 @@ $(READY): pyproject.toml constraints.txt
 	@mkdir -p $(VENV) && rm -f $(READY) && touch $(VENV)/.begun
 	@echo "Making $(VENV); the first time takes some minutes"
 	@$(PYTHON) -m venv $(VENV)
+	@if test -n "$(HASHES)"; then $(INSTALL) --require-hashes --no-deps --requirement requirements.lock; fi
 	@$(INSTALL) "$$(grep '^torch==' constraints.txt)"
 	@$(INSTALL) --editable ".[$(EXTRAS)]" --constraint constraints.txt
 	@mv $(VENV)/.begun $(READY)
@@ -64,6 +67,15 @@ check: lint types layers test ## All of the above checks
 audit: $(READY) ## Look up known vulnerabilities of the pinned packages
 	@$(INSTALL) pip-audit --constraint constraints.txt || { echo "make audit needs the network, to install pip-audit" >&2; exit 1; }
 	@$(BIN)/pip-audit --strict --progress-spinner off --no-deps --disable-pip --requirement constraints.txt || { echo "make audit: a pinned package has a known vulnerability, or the public list does not answer; see above" >&2; exit 1; }
+
+hashes: $(READY) ## Write the hashes of the pinned packages into requirements.lock
+	@$(INSTALL) uv
+	@mkdir -p build && echo "torch; python_version < '3'" > build/without_torch.txt
+	@grep '^#' requirements.lock > build/requirements.lock
+	$(BIN)/uv pip compile --quiet pyproject.toml $(foreach extra,$(subst $(COMMA), ,$(EXTRAS)),--extra $(extra)) \
+		--constraint constraints.txt --override build/without_torch.txt --python-version 3.11 --universal \
+		--generate-hashes --no-header --no-annotate --output-file build/hashes.txt
+	@cat build/hashes.txt >> build/requirements.lock && mv build/requirements.lock requirements.lock
 
 licences: $(READY) ## Write the licences of the pinned packages into docs/licences.md
 	$(BIN)/python docs/make_licences.py

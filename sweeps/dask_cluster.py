@@ -13,6 +13,7 @@ from queue import Empty, SimpleQueue
 from dask.distributed import Client, Future
 from distributed.scheduler import KilledWorker
 
+from sweeps.limits import scaled
 from sweeps.worker import Act, Done, Task, do_in_cluster
 
 SECONDS = 10.0  # timeout of the first connection
@@ -44,7 +45,7 @@ def run(act: Act, tasks: Mapping[str, Task], address: str) -> Iterator[Done]:
 
 def _client(address: str) -> Client:
     try:
-        return Client(address, timeout=SECONDS, set_as_default=False)
+        return Client(address, timeout=scaled(SECONDS), set_as_default=False)
     except (OSError, ValueError) as error:
         raise ValueError(
             f"no Dask scheduler answers at {address!r} ({error}); start it and its workers by the "

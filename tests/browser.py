@@ -11,6 +11,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
 
+from sweeps.limits import scaled
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 LOADED = 'document.readyState == "complete" || new Promise((go) => addEventListener("load", go))'
 
@@ -61,7 +63,7 @@ class Browser:
     def __exit__(self, *_: object) -> None:
         self._child.terminate()
         try:
-            self._child.wait(20)
+            self._child.wait(scaled(20.0))
         except subprocess.TimeoutExpired:
             self._child.kill()
             self._child.wait()
@@ -105,7 +107,8 @@ class Browser:
             self._out.flush()
         except BrokenPipeError:
             raise OSError(self._ended()) from None
-        end = time.monotonic() + self.limit
+        limit = scaled(self.limit)
+        end = time.monotonic() + limit
         while True:
             answer = json.loads(self._read(end, method))
             if answer.get("sessionId") == session and (fault := _fault(answer)):

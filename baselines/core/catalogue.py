@@ -4,7 +4,8 @@ Each module of this package that defines controllers holds their entries in ``EN
 :class:`~baselines.core.entry.Entry` by name; the catalogue collects them. Third-party controllers
 are added by :func:`register`, by :func:`load` from a folder of such modules, by folders in the
 environment variable ``PAM_ENVS_CONTROLLERS`` (separated as in ``PATH``), or by modules of other
-distributions (:mod:`pam_envs.entry_points`); command lines read the last two as well.
+distributions (:mod:`pam_envs.entry_points`); command lines read the last two as well. Controllers
+of the variable's folders run in processes of their own (:mod:`baselines.core.isolated`).
 
 A controller is built from a nominal plant and the named signals, never from an environment. Its
 model knowledge is part of its result. For "nominal model" the caller provides the model: if that is
@@ -25,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import baselines
-from baselines.core import informed, tuned
+from baselines.core import informed, isolated, tuned
 from baselines.core.controller import Controller
 from baselines.core.entry import AS_DESIGNED, Entry, Knobs, Spec, check_knobs
 from pam_envs import entry_points
@@ -136,7 +137,8 @@ def _collect() -> None:
     CONTROLLERS.update(informed.entries(PUBLISHED))
     entry_points.each(entry_points.CONTROLLERS, lambda found: _register_entries(found.load()))
     for folder in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
-        load(folder)
+        for name, entry in isolated.entries(folder).items():
+            register(name, entry)
 
 
 _collect()

@@ -18,9 +18,17 @@ Fields = Mapping[str, Any]
 
 def bibtex(row: Mapping[str, Any]) -> str:
     """Return the BibTeX of a row; raise ValueError if a method is not in ``references.bib``."""
-    sources = citations.entry_texts(methods(str(row["controller"]["citation"])))
+    sources = citations.entry_texts(methods_of(row["controller"]))
     parts = [_row_entry(row), package(), *sources]
     return "\n".join(parts)
+
+
+def methods_of(controller: Mapping[str, Any]) -> list[str]:
+    """Return the keys that a row's controller cites; a ValueError names the controller."""
+    try:
+        return methods(str(controller["citation"]))
+    except ValueError as error:
+        raise ValueError(f"citation of {controller['name']}: {error}") from error
 
 
 def methods(citation: str) -> list[str]:

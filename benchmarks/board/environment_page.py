@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, standings
 from benchmarks.board import format as fmt
-from benchmarks.board.cite import methods
+from benchmarks.board.cite import methods_of
 from benchmarks.board.claims import Claim
 from benchmarks.board.standings import Changes, Listing, Track
 from benchmarks.board.words import (
@@ -250,7 +250,7 @@ def _controllers(entries: Mapping[str, Row]) -> list[str]:
     lines, named = [], set[str]()
     for name in sorted(entries):
         about = entries[name]["controller"]
-        keys = methods(about["citation"])
+        keys = methods_of(about)
         cited = f" ({', '.join(keys)})" if keys else ""
         lines.append(f"- `{name}`: {about['summary']}{cited}")
         named |= set(keys)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from benchmarks.identity.hashing import digest
 from sweeps.files import SOURCES, sources_digest
+from sweeps.limits import scaled
 from sweeps.versions import versions_of
 
 HERE = Path(__file__).resolve().parents[1]
@@ -67,7 +68,7 @@ def changed(folder: Path = ROOT) -> list[str]:
 def git(*arguments: str, folder: Path = ROOT) -> str:
     """Return the output of git in a folder."""
     command = ["git", "-C", str(folder), *arguments]
-    done = subprocess.run(command, check=True, capture_output=True, timeout=20)
+    done = subprocess.run(command, check=True, capture_output=True, timeout=scaled(20.0))
     return done.stdout.decode().strip()
 
 

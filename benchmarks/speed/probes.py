@@ -17,6 +17,7 @@ from pam_envs.mechanics.redundancy.resolution import resolve
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.pneumatics.flow import AIRS
 from pam_envs.references.path import PATHS
+from sweeps.limits import scaled
 
 ENV = "PAM/MusclePositioning-v0"
 KNEE, BRACE = "PAM/KneeWalk-v0", "PAM/KneeTension-v0"
@@ -306,7 +307,7 @@ def _python(code: str, *arguments: str, **environment: str) -> str:
         env={**os.environ, "PYTHONPATH": paths, **environment},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=scaled(300.0),
     )
     if done.returncode:
         raise Missing((done.stderr.strip().splitlines() or ["no output"])[-1])

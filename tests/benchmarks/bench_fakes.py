@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import yaml
 
+from sweeps.limits import scaled
+
 
 def wait_at_the_gate() -> None:
-    """Wait while there is the file that ``BENCH_FAKES_GATE`` names, two minutes at most."""
+    """Wait while there is the file that ``BENCH_FAKES_GATE`` names, within a limit."""
     gate = os.environ.get("BENCH_FAKES_GATE")
-    until = time.monotonic() + 120.0
+    until = time.monotonic() + scaled(120.0)
     while gate and os.path.exists(gate) and time.monotonic() < until:
         time.sleep(0.02)
 

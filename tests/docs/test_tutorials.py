@@ -5,9 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from sweeps.limits import scaled
+
 jupytext = pytest.importorskip("jupytext")
 nbclient = pytest.importorskip("nbclient")
 pytest.importorskip("ipykernel")
+
 ROOT = Path(__file__).parents[2]
 NEEDED = {
     "diagnose": ["matplotlib"],
@@ -35,7 +38,10 @@ def test_tutorial_runs(name):
         pytest.importorskip(package)
     notebook = jupytext.read(PAGES[name])
     client = nbclient.NotebookClient(
-        notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(ROOT)}}
+        notebook,
+        timeout=int(scaled(600)),
+        kernel_name="python3",
+        resources={"metadata": {"path": str(ROOT)}},
     )
     client.execute()  # raises CellExecutionError with the failing cell
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]

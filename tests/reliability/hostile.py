@@ -1,14 +1,17 @@
 """Hostile files, tampered states and drawn actions in bulk, each kind in a process of its own."""
 
 import contextlib
+import copy
 import dataclasses
 import functools
 import hashlib
+import itertools
 import json
 import lzma
 import os
 import random
 import resource
+import shutil
 import signal
 import sys
 from collections import Counter
@@ -181,6 +184,80 @@ def files(folder: Path, number: int) -> Iterator[tuple[str, int, Counter[Outcome
         yield kind.name, len(contents), isolated(len(contents), act)
 
 
+# --- rows of the board ---------------------------------------------------------------------------
+
+
+def board(number: int, folder: Path) -> Iterator[tuple[str, int, Counter[Outcome]]]:
+    """Yield how boards and sites of rows end of which one was changed and has a new checksum.
+
+    The committed verifications count as those of the folder, so that a row without a new checksum,
+    or with an unnoticed change, would be shown as verified.
+    """
+    from benchmarks.board import accessors, leaderboard, site
+    from benchmarks.runs import rows, store, verified
+
+    track = "elbow_nominal"
+    shutil.copytree(rows.RESULTS / track, folder / track)
+    for path in sorted((folder / track).iterdir())[3:]:
+        path.unlink()
+    found = verified.committed(rows.RESULTS)
+    verified.committed = lambda _: found  # type: ignore[assignment]
+    path = rows.files(folder)[0]
+    good = store.read_json(path)
+    assert all(row[accessors.VERIFIED] for row in leaderboard.load(folder))
+
+    def act(i: int) -> Outcome:
+        draws = random.Random(i)
+        changed = copy.deepcopy(good)
+        while store.comparable(changed) == store.comparable(good):
+            alter(changed, draws)
+        if draws.random() < 0.9:
+            changed = store.seal(changed)
+        path.write_bytes(lzma.compress(json.dumps(changed).encode(), preset=0))
+        try:
+            loaded = leaderboard.load(folder)
+            leaderboard.files(loaded)
+            site.page(loaded)
+        except ValueError as error:
+            named = good["controller"]["name"] in str(error)
+            return "refused" if named else "no name in the message"
+        (row,) = (row for row in loaded if row["row"] == good["row"])
+        return "shown as verified" if row[accessors.VERIFIED] else "shown, not as verified"
+
+    yield "rows", number, isolated(number, act)
+
+
+STRANGE: tuple[Any, ...] = (
+    *(None, True, -1, 0, 2**70, 1e300, -1e-300, "", "<b>", "\x1b[1m", "x" * 9999, "../../x"),
+    *([], {}, [[]], {"": 0}),
+)
+"""Values in place of one of a row."""
+
+
+def alter(record: Any, draws: random.Random) -> None:
+    """Change, remove, double or exchange one of the values of nested lists and mappings."""
+    held = record
+    while True:
+        keys = list(held) if isinstance(held, dict) else range(len(held))
+        key = draws.choice(list(keys))
+        if not isinstance(held[key], (dict, list)) or not held[key] or draws.random() < 0.1:
+            break
+        held = held[key]
+    kind, other = draws.randrange(5), draws.choice(list(keys))
+    if kind == 0:
+        del held[key]
+    elif kind == 1 and isinstance(held, dict):
+        held[f"{key}_more"] = held[key]
+    elif kind == 1:
+        held.append(held[key])
+    elif kind == 2:
+        held[key], held[other] = held[other], held[key]
+    elif kind == 3 and isinstance(held[key], (int, float)):
+        held[key] *= draws.choice([1 - 1e-5, 0.5, -1, 1e9])
+    else:
+        held[key] = draws.choice(STRANGE)
+
+
 # --- actions, states, checkpoints, cache ---------------------------------------------------------
 
 
@@ -219,36 +296,46 @@ def actions(number: int) -> Iterator[tuple[str, int, Counter[Outcome]]]:
 
 
 def states(number: int, folder: Path) -> Iterator[tuple[str, int, Counter[Outcome]]]:
-    """Yield how single changed numbers of states and of checkpoints end, with steps after them."""
+    """Yield how single changed numbers of states and of checkpoints end, with steps after them.
+
+    Then the same for changes whose author makes a new digest, which only have to crash nothing.
+    """
     import gymnasium as gym
 
+    from pam_envs.envs.core.saved_state import sealed
+    from tests.agents import short_runs
     from tests.envs.cases import IDS
 
     each = -(-number // (len(IDS) + 1))
-    for name in IDS:
+    for name, anew in itertools.product(IDS, (False, True)):
         env: Any = gym.make(name).unwrapped
         env.reset(seed=3)
         env.step(np.zeros(env.action_space.shape))
         state = env.get_state()
         draws = np.random.default_rng(IDS.index(name))
 
-        def act(_: int, env: Any = env, state: Any = state, draws: Any = draws) -> Outcome:
-            key = str(draws.choice(sorted(state)))
+        def act(
+            _: int, env: Any = env, state: Any = state, draws: Any = draws, anew: bool = anew
+        ) -> Outcome:
+            key = str(draws.choice(sorted(key for key in state if state[key].size)))
             changed = state[key].copy()
             place = tuple(int(draws.integers(n)) for n in changed.shape)
-            changed[place] = tampered(changed[place], draws)
-            if np.array_equal(changed, state[key], equal_nan=True):
-                return "refused"  # nothing was changed
+            while np.array_equal(changed, state[key], equal_nan=True):
+                changed[place] = tampered(changed[place], draws)
+            given = {**state, key: changed}
             try:
-                env.set_state({**state, key: changed})
+                env.set_state(sealed(given) if anew else given)
             except ValueError:
                 return "refused"
             for _ in range(3):
                 env.step(np.zeros(env.action_space.shape))
-            return f"finite number of '{key}' accepted"
+            return "digest made anew, accepted" if anew else f"changed '{key}' accepted"
 
-        yield name, each, isolated(each, act)
-    yield "checkpoint.pt", each, checkpoints(each, folder)
+        yield f"{name}{', digest made anew' if anew else ''}", each, isolated(each, act)
+    short_runs.trained(folder / "trained", short_runs.tiny(steps=256))
+    for anew in (False, True):
+        name = f"checkpoint.pt{', digest made anew' if anew else ''}"
+        yield name, each, checkpoints(each, folder, anew)
 
 
 def tampered(value: Any, draws: np.random.Generator) -> Any:
@@ -263,15 +350,13 @@ def tampered(value: Any, draws: np.random.Generator) -> Any:
     return max(bounds.min, min(bounds.max, int(np.nan_to_num(chosen, posinf=2**62))))
 
 
-def checkpoints(number: int, folder: Path) -> Counter[Outcome]:
-    """Return how checkpoints with one changed number and a new checksum end."""
+def checkpoints(number: int, folder: Path, anew: bool) -> Counter[Outcome]:
+    """Return how checkpoints with one changed number end, with the old checksum or a new one."""
     import torch
 
     from agents.training import checkpoint, train
-    from tests.agents import short_runs
 
-    short_runs.trained(folder / "trained", short_runs.tiny(steps=256))
-    good = checkpoint.load(folder / "trained/checkpoint.pt")
+    good = (folder / "trained/checkpoint.pt").read_bytes()
     draws = np.random.default_rng(0)
     target = folder / "tampered"
     target.mkdir(exist_ok=True)
@@ -279,46 +364,39 @@ def checkpoints(number: int, folder: Path) -> Counter[Outcome]:
     def act(_: int) -> Outcome:
         content = checkpoint.load(folder / "trained/checkpoint.pt")
         leaves = list(_leaves(content["snapshot"]))
-        holder, key, path = leaves[int(draws.integers(len(leaves)))]
+        holder, key = leaves[int(draws.integers(len(leaves)))]
         value = holder[key]
         if isinstance(value, torch.Tensor):
-            if not value.numel():
-                return "refused"
-            flat = value.reshape(-1)
+            flat = value.reshape(-1).clone()
             place = int(draws.integers(len(flat)))
-            new = torch.tensor(tampered(flat[place].numpy(), draws)).to(value.dtype)
-            if torch.equal(flat[place], new):
-                return "refused"
-            flat[place] = new
+            while torch.equal(flat, value.reshape(-1)):
+                new = torch.tensor(tampered(flat[place].numpy(), draws))
+                flat[place] = new.to(value.dtype)
             holder[key] = flat.reshape(value.shape)
-        elif isinstance(value, (int, float)):
-            holder[key] = tampered(value, draws)
         else:
-            holder[key] = None
-        checkpoint.save(target / "checkpoint.pt", content)
+            holder[key] = tampered(value, draws) if isinstance(value, (int, float)) else None
+        path = target / "checkpoint.pt"
+        checkpoint.save(path, content)
+        if not anew:
+            head = len(checkpoint.MARK) + 32
+            path.write_bytes(good[:head] + path.read_bytes()[head:])
         try:
-            run = train.saved_run(target)
-            model = train.resume(run)
-        except ValueError:
-            return "refused"
-        try:
+            model = train.resume(train.saved_run(target))
             model.learn(64, reset_num_timesteps=False)
-        except ValueError:  # torch finds an action that is not finite; a sentence for the user
+        except ValueError:  # of learning, where torch finds an action that is not finite
             return "refused"
-        return f"finite number of '{path}' accepted"
+        return "digest made anew, accepted" if anew else "changed number accepted"
 
-    assert good
     return isolated(number, act)
 
 
-def _leaves(value: Any, path: str = "") -> Iterator[tuple[Any, Any, str]]:
-    items = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, entry in items:
-        place = path or str(key)
+def _leaves(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield the holders and keys of all numbers and tensors that are not empty."""
+    for key, entry in value.items() if isinstance(value, dict) else enumerate(value):
         if isinstance(entry, (dict, list)):
-            yield from _leaves(entry, place)
-        else:
-            yield value, key, place
+            yield from _leaves(entry)
+        elif entry is not None and getattr(entry, "shape", (1,)) != (0,):
+            yield value, key
 
 
 def cache(number: int, folder: Path) -> Counter[Outcome]:

@@ -15,6 +15,7 @@ import os
 import resource
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import traceback
@@ -29,8 +30,11 @@ import yaml
 
 Results = dict[str, str]
 COUNT = "count.txt"
-FAULTS = ("kill", "interrupt", "full disk", "file limit")
-"""A kill or an interrupt at an operation; no room for a new file; none for more bytes."""
+FAULTS = ("kill", "interrupt", "full disk", "file limit", "small disk")
+"""A kill or an interrupt at an operation; no room for a new file; none for more bytes in a file; a
+real file system with little room, which only root can mount."""
+ROOM = (0, 4, 16, 64, 256, 1024)
+"""Free kB of a small disk."""
 EVENTS = ("open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.link", "os.listdir")
 
 
@@ -269,6 +273,38 @@ def _tuned(folder: Path) -> Results:
     }
 
 
+def _search(folder: Path) -> int:
+    from agents import __main__ as agents
+    from agents.search import spaces, tune
+    from agents.settings import presets
+
+    def sizes(job: Any, trial: Any) -> float:
+        """Return a fake value of a trial, from its settings alone."""
+        values = spaces.suggest(trial, job.config).values()
+        return float(sum(value for value in values if isinstance(value, (int, float))))
+
+    known = tune.objective, presets.preset_path
+    tune.objective, presets.preset_path = sizes, lambda *_: folder / "preset.yaml"
+    try:
+        given = ("--trials", 3, "--steps", 256, "--storage", folder / "search.db", "--write")
+        return _cli(agents, "tune", "PAM/MusclePositioning-v0", *given)
+    finally:
+        tune.objective, presets.preset_path = known
+
+
+def _copy_preset(folder: Path) -> None:
+    from agents.settings import presets
+
+    shutil.copy(presets.preset_path("PAM/MusclePositioning-v0", "ppo"), folder / "preset.yaml")
+
+
+def _preset(folder: Path) -> Results:
+    from agents.settings import presets
+
+    presets.read(folder / "preset.yaml")
+    return {"preset.yaml": digest(folder / "preset.yaml")}
+
+
 @cache
 def _readings() -> Any:
     """Return the diagnosis of the shipped readings, computed once."""
@@ -320,6 +356,7 @@ COMMANDS = (
     Command("train", _train, _policy),
     Command("sweep", _sweep, _policy),
     Command("tune", _tune, _tuned, _copy_tuned),
+    Command("search", _search, _preset, _copy_preset),  # agents tune
     Command(
         "diagnose", _diagnose, lambda f: {"": digest(f / "diagnosis")}, _older_diagnosis, _readings
     ),
@@ -410,6 +447,37 @@ def counting(folder: Path) -> Callable[[], None]:
     return start
 
 
+def mounted(folder: Path) -> bool:
+    """Mount a file system of its own, in memory, on an empty folder; False if that is refused."""
+    command = ["mount", "-t", "tmpfs", "-o", "size=256m", "tmpfs", str(folder)]
+    try:
+        return subprocess.run(command, capture_output=True, check=False).returncode == 0
+    except OSError:
+        return False
+
+
+def leave_room(folder: Path, free: int) -> None:
+    """Change the size of a mounted file system to what it holds and ``free`` kB."""
+    of = os.statvfs(folder)
+    size = free + (of.f_blocks - of.f_bfree) * of.f_frsize // 1024
+    subprocess.run(["mount", "-o", f"remount,size={size}k", str(folder)], check=True)
+
+
+def unmount(folder: Path) -> None:
+    """Unmount a file system."""
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+@cache
+def faults() -> tuple[str, ...]:
+    """Return the faults that this machine can have."""
+    with tempfile.TemporaryDirectory() as place:
+        if not mounted(Path(place)):
+            return FAULTS[:-1]
+        unmount(Path(place))
+        return FAULTS
+
+
 @dataclass
 class Tried:
     """Outcome of a fault: what was wrong, if anything."""
@@ -441,15 +509,31 @@ class Trials:
         self.new = command.results(whole)
         shutil.rmtree(whole)
 
-    def _copy(self, name: str) -> Path:
+    def _copy(self, name: str, small: bool = False) -> Path:
         # each in a folder of one name, since results may contain the path
         folder = self.place / name
-        shutil.copytree(self.first, folder)
+        folder.mkdir()
+        assert not small or mounted(folder)
+        shutil.copytree(self.first, folder, dirs_exist_ok=True)
         return folder
 
     def tried(self, fault: str, at: int) -> Tried:
         """Run the command with a fault, and once more without."""
-        folder, wrong = self._copy("work"), list[str]()
+        small = fault == "small disk"
+        folder = self._copy("work", small)
+        try:
+            if small:
+                leave_room(folder, ROOM[at % len(ROOM)])
+            wrong = self._wrong(fault, at, folder)
+        finally:
+            if small:
+                unmount(folder)
+        shutil.rmtree(folder)
+        return Tried(self.command.name, fault, at, wrong)
+
+    def _wrong(self, fault: str, at: int, folder: Path) -> list[str]:
+        """Return what is wrong with a command under a fault, and with the same one after it."""
+        wrong = list[str]()
         code, said = forked(self.command, folder, injected(folder, fault, at))
         try:
             found = self.command.results(folder)
@@ -465,16 +549,16 @@ class Trials:
         expected = {"kill": (-9, 0), "interrupt": (130, 0)}.get(fault, (0, 1, 2))
         if code not in expected:
             wrong.append(f"exit code {code}: {said[-300:]}")
-        if fault in ("full disk", "file limit") and code and str(folder) not in said:
+        if fault in ("full disk", "file limit", "small disk") and code and str(folder) not in said:
             wrong.append(f"no path in the message: {said[-300:]}")
+        if fault == "small disk":
+            leave_room(folder, 2**18)
         code, said = forked(self.command, folder, lambda: None)
         if code != 0:
             wrong.append(f"the same command ended with {code}: {said[-300:]}")
         elif self.command.results(folder) != self.new:
             wrong.append("the same command gives other results")
-        wrong += [f"left: {path.name}" for path in folder.rglob("*.tmp")]
-        shutil.rmtree(folder)
-        return Tried(self.command.name, fault, at, wrong)
+        return wrong + [f"left: {path.name}" for path in folder.rglob("*.tmp")]
 
 
 @contextmanager
@@ -500,6 +584,6 @@ def trials(number: int, only: tuple[str, ...] = ()) -> Iterator[Tried]:
             made = Trials(command, place / command.name)
             mine = range(k, number, len(chosen))
             for i in range(len(mine)):
-                fault = FAULTS[i % len(FAULTS)]
+                fault = faults()[i % len(faults())]
                 yield made.tried(fault, 1 + made.operations * i // len(mine))
             shutil.rmtree(made.place)

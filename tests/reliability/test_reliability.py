@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from pam_envs.files import TEMPORARY, fresh_folder, write_text
+from tests.reliability.forgeries import FORGERIES
 
 ROOT = Path(__file__).parents[2]
 
@@ -26,10 +27,18 @@ def test_kills_interrupts_and_full_disks_lose_no_result() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")
-@pytest.mark.parametrize("what", ["files", "states"])
+@pytest.mark.parametrize("what", ["files", "states", "board"])
 def test_hostile_content_is_refused_in_bounded_time(what: str) -> None:
     pytest.importorskip("stable_baselines3")
     assert "\n0 not as they should be" in attack(what, "--number", "90")
+
+
+def test_every_forgery_has_one_test_of_its_own() -> None:
+    tests = [test for _, _, test in FORGERIES]
+    assert len(set(tests)) == len(tests) == 33
+    for test in tests:
+        name = test.partition("::")[2].partition("[")[0]
+        assert f"def {name}(" in (ROOT / test.partition("::")[0]).read_text(encoding="utf-8")
 
 
 def test_fresh_folder_replaces_its_own_files_and_keeps_others(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from pam_envs.rig.modbus import Channel, ModbusDriver
+from sweeps.limits import scaled
 
 INPUTS = {"pressure": Channel(0, 0.0, 1e6), "contraction": Channel(1, -0.01, 0.04)}
 OUTPUTS = {"pressure_set_point": Channel(0, 0.0, 1e6)}
@@ -38,16 +39,16 @@ def port():
 
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
-    asyncio.run_coroutine_threadsafe(serve(), loop).result(30)
+    asyncio.run_coroutine_threadsafe(serve(), loop).result(scaled(30.0))
     yield number
-    asyncio.run_coroutine_threadsafe(servers[0].shutdown(), loop).result(30)
+    asyncio.run_coroutine_threadsafe(servers[0].shutdown(), loop).result(scaled(30.0))
     loop.call_soon_threadsafe(loop.stop)
     thread.join()
     loop.close()
 
 
 def test_registers_are_read_and_written_in_si(port):
-    driver = ModbusDriver("127.0.0.1", INPUTS, OUTPUTS, watchdog=16, port=port, timeout=5.0)
+    driver = ModbusDriver("127.0.0.1", INPUTS, OUTPUTS, watchdog=16, port=port, timeout=scaled(5.0))
     driver.open()
     sample = driver.read()
     assert sample is not None
@@ -68,7 +69,7 @@ def test_registers_are_read_and_written_in_si(port):
 
 def test_register_that_the_device_lacks_is_lost_or_refused(port):
     far = {"pressure": Channel(500, 0.0, 1e6)}
-    driver = ModbusDriver("127.0.0.1", far, OUTPUTS, watchdog=900, port=port, timeout=5.0)
+    driver = ModbusDriver("127.0.0.1", far, OUTPUTS, watchdog=900, port=port, timeout=scaled(5.0))
     driver.open()
     assert driver.read() is None
     with pytest.raises(OSError, match="check the addresses"):

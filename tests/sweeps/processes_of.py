@@ -10,6 +10,8 @@ from pathlib import Path
 
 import psutil
 
+from sweeps.limits import scaled
+
 ROOT = Path(__file__).resolve().parents[2]
 MARK = "PAM_ENVS_TEST_FAMILY"
 
@@ -56,7 +58,7 @@ def alive(family: str, word: str = "") -> list[psutil.Process]:
 
 def wait_until(true: Callable[[], object], seconds: float = 300.0) -> None:
     """Wait for something to become true; fail where it does not."""
-    until = time.monotonic() + seconds
+    until = time.monotonic() + scaled(seconds)
     while not true():
         assert time.monotonic() < until, "it did not come about"
         time.sleep(0.01)

@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from sweeps.limits import scaled
 from sweeps.worker import is_needed
 
 
@@ -49,7 +50,7 @@ def square(task: Number) -> int:
     if task.kind == "slow":
         time.sleep(0.3)
     if task.kind == "endless":
-        until = time.monotonic() + 60.0
+        until = time.monotonic() + scaled(60.0)
         while is_needed() and time.monotonic() < until:
             time.sleep(0.05)
         (Path(task.folder) / f"ended_{task.number}").write_text("")

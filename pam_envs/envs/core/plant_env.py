@@ -8,6 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs.core.info import Info
+from pam_envs.envs.core.saved_state import (
+    check_seal,
+    check_state,
+    saved,
+    saved_part,
+    sealed,
+)
 from pam_envs.envs.core.setup import (
     BEGIN,
     MOST_STEPS,
@@ -16,10 +23,7 @@ from pam_envs.envs.core.setup import (
     Configured,
     Setup,
     check_seed,
-    check_state,
     fresh_seed,
-    saved,
-    saved_part,
     space_of,
 )
 from pam_envs.kernels.build import COMPILED, address_book
@@ -212,12 +216,14 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def get_state(self) -> dict[str, NDArray[Any]]:
         """Return the complete state of the environment, as arrays that own their data."""
         seed = -1 if self._seed is None else self._seed
-        return {
-            **saved(self._all),
-            "infos": np.array(self._infos, np.float64),
-            "steps": np.array(self._steps),
-            "seed": np.frombuffer(str(seed).encode(), np.uint8).copy(),
-        }
+        return sealed(
+            {
+                **saved(self._all),
+                "infos": np.array(self._infos, np.float64),
+                "steps": np.array(self._steps),
+                "seed": np.frombuffer(str(seed).encode(), np.uint8).copy(),
+            }
+        )
 
     def set_state(self, state: dict[str, NDArray[Any]]) -> None:
         """Restore a state of :meth:`get_state`, to the last bit.
@@ -225,7 +231,8 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises
         ------
         ValueError
-            If the state is of another kind of environment; nothing has changed then.
+            If the state is of another kind of environment, or has changed and was not sealed
+            anew (:func:`pam_envs.envs.core.saved_state.sealed`); nothing has changed then.
         """
         steps = int(saved_part(state, "steps", (), "i"))
         digits = saved_part(state, "seed", (np.size(state.get("seed", ())),), "u")
@@ -237,6 +244,7 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise ValueError(f"the state has steps = {steps} and seed = {shown(seed)}; no run has")
         parts = check_state(state, self.setup, 1, 1, steps >= 0)
         infos = saved_part(state, "infos", np.shape(self._infos), "f")
+        check_seal(state)
         for to, part in zip(self._all, parts, strict=True):
             for i, value in enumerate(part[0].tolist()):
                 to[0][i][0] = value[0]

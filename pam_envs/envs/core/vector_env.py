@@ -9,6 +9,14 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from pam_envs.envs.core.saved_state import (
+    check_limits,
+    check_seal,
+    check_state,
+    saved,
+    saved_part,
+    sealed,
+)
 from pam_envs.envs.core.setup import (
     BEGIN,
     STEP,
@@ -16,14 +24,10 @@ from pam_envs.envs.core.setup import (
     Configured,
     Setup,
     check_choice,
-    check_limits,
     check_seed,
-    check_state,
     check_whole,
     for_kernels,
     fresh_seed,
-    saved,
-    saved_part,
     space_of,
     tiles_for,
 )
@@ -286,12 +290,14 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """Return the complete state of the batch, as arrays that own their data."""
-        return {
-            **saved(self._all),
-            "last": self._last_observation.copy(),
-            "seeded": np.array(self._seeded),
-            "ended": self._ended.copy(),
-        }
+        return sealed(
+            {
+                **saved(self._all),
+                "last": self._last_observation.copy(),
+                "seeded": np.array(self._seeded),
+                "ended": self._ended.copy(),
+            }
+        )
 
     def set_state(self, state: dict[str, NDArray[Any]]) -> None:
         """Restore a state of :meth:`get_state`, to the last bit.
@@ -299,7 +305,8 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         Raises
         ------
         ValueError
-            If the state is of another kind of batch; nothing has changed then.
+            If the state is of another kind of batch, or has changed and was not sealed anew
+            (:func:`pam_envs.envs.core.saved_state.sealed`); nothing has changed then.
         """
         seeded = bool(saved_part(state, "seeded", (), "b"))
         parts = check_state(state, self.setup, tiles_for(self.num_envs), LANES, seeded)
@@ -307,6 +314,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         ended = saved_part(state, "ended", self._ended.shape, "b")
         restarts_later = seeded and self.autoreset_mode != AutoresetMode.SAME_STEP
         check_limits("ended", ended, 0, int(restarts_later))
+        check_seal(state)
         self._all = tuple(map(for_kernels, parts))
         self._last_observation, self._seeded, self._ended = last, seeded, ended.copy()
         self._renderers = []

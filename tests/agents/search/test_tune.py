@@ -66,7 +66,7 @@ tune.HEARTBEAT = 1
 def hang(*_):
     time.sleep(2)  # until the first sign of life is written
     print("running", flush=True)
-    time.sleep(600)
+    time.sleep(10_000)
 tune.objective = hang
 tune.search(test_tune.job(Path({str(tmp_path)!r}), 1), test_tune.QUIET)
 """

@@ -17,6 +17,7 @@ from benchmarks.runs import rows, traces
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
 from benchmarks.runs.store import write_json
+from sweeps.limits import scaled
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 BROWSER = next((path for path in map(shutil.which, BROWSERS) if path), None)
@@ -55,7 +56,7 @@ def browse(address: str, folder: Path) -> str:
         *("--proxy-server=127.0.0.1:9", f"--user-data-dir={folder / 'profile'}"),
         *("--virtual-time-budget=20000", "--dump-dom", address),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=scaled(120), check=True)
     return done.stdout
 
 

@@ -1,4 +1,4 @@
-"""Tampered states are refused with nothing written, and no accepted one crashes the next step."""
+"""Tampered states are refused unwritten, and those sealed anew crash no step."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pam_envs.envs.core.setup import STATE_KEYS
+from pam_envs.envs.core.saved_state import STATE_KEYS, sealed
 from pam_envs.envs.core.step import CHOICE, MEMBER
 from pam_envs.kernels.build import COMPILED
 from tests.envs.cases import IDS
@@ -97,8 +97,41 @@ def test_missing_keys_wrong_types_and_values_that_are_not_finite_are_refused(
     unchanged(env, state)
 
 
+@pytest.mark.parametrize("make", [single, batch])
+@pytest.mark.parametrize("name", IDS)
+def test_any_changed_number_is_noticed_unless_the_state_is_sealed_anew(
+    make: Any, name: str
+) -> None:
+    env = make(name)
+    state = env.get_state()
+    random = np.random.default_rng(1)
+    for key in ("rows", "ahead", "infos", "last", "digest"):
+        for _ in range(10 if state.get(key, np.zeros(0)).size else 0):
+            changed = state[key].copy()
+            place = tuple(int(random.integers(n)) for n in changed.shape)
+            whole = changed.dtype.kind == "u"
+            changed[place] = changed[place] ^ 1 if whole else np.nextafter(changed[place], 1e9)
+            with pytest.raises(ValueError, match=r"changed since get_state.*sealed\(state\)"):
+                env.set_state({**state, key: changed})
+    with pytest.raises(ValueError, match="changed since get_state"):
+        env.set_state({**state, 7: "more"})
+    unchanged(env, state)
+    env.set_state(sealed({**state, "more": np.ones(1)}))
+    unchanged(env, state)
+
+
+def test_state_changed_on_purpose_is_restored_after_sealing() -> None:
+    env = single("PAM/MusclePositioning-v0")
+    state = env.get_state()
+    state["ahead"] = state["ahead"] + 1e-3
+    with pytest.raises(ValueError, match="changed since get_state"):
+        env.set_state(state)
+    env.set_state(sealed(state))
+    assert np.array_equal(env.get_state()["ahead"], state["ahead"])
+
+
 def run_drawn_changes(name: str, changes: int) -> None:
-    """Tamper with single numbers of a state; let compiled code step from those accepted."""
+    """Change numbers of a state and seal it; let compiled code step from those accepted."""
     random = np.random.default_rng(0)
     env = single(name)
     env._use(env.setup.kernels.single.wait(), compiled=True)
@@ -111,7 +144,7 @@ def run_drawn_changes(name: str, changes: int) -> None:
         value = random.choice([1e300, -1e300, 1e9, -1e9, 2.0**40, -3.0, 200.0])
         tampered[place] = np.clip(value, -(2.0**62), 2.0**62) if key == "counts" else value
         try:
-            env.set_state({**state, key: tampered})
+            env.set_state(sealed({**state, key: tampered}))
         except ValueError:
             refused += 1
         for _ in range(3):
