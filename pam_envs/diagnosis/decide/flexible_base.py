@@ -84,6 +84,14 @@ def _shown(
             yield cause, replace(form, terms=terms)
 
 
+def _idle(causes: Sequence[tuple[Cause, Form]], names: Collection[str]) -> Iterator[str]:
+    """Yield the terms that only shape effects without an amount among some names."""
+    for cause, _ in causes:
+        on = [form for form in cause.forms if any(t.amount and t.name in names for t in form.terms)]
+        used = {t.name for form in on for t in form.terms}
+        yield from (t.name for form in cause.forms for t in form.terms if t.name not in used)
+
+
 @dataclass(frozen=True)
 class FlexibleBase:
     """Selection of the common differences on a fitted base."""
@@ -256,6 +264,9 @@ class FlexibleBase:
             kept[k] = False
         if kept.all():
             return model
+        shown = {f.name for f, k in zip(fit.frees, kept, strict=True) if k}
+        idle = set(_idle(model.causes, shown))
+        kept &= np.array([f.name not in idle for f in fit.frees])
         column = fit.column.copy()
         for gone in np.flatnonzero(~kept):
             column[fit.frees[gone].place] = neutral[fit.frees[gone].place]
