@@ -16,6 +16,7 @@ import subprocess
 import sys
 import warnings
 import weakref
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -31,6 +32,7 @@ from pam_envs.kernels import cache
 MOST = 2**26  # bytes of an answer
 LONGEST = 1000  # characters of a message
 NUMBERS = re.compile(r"[<|][biuf](1|2|4|8|16)")
+SERVER = f"{__name__}_server"
 LIBRARIES = (
     *("/usr/lib", "/usr/lib64", "/usr/local/lib", "/usr/share", "/usr/bin", "/lib", "/lib64"),
     *("/bin", "/etc", "/proc", "/sys", "/dev"),
@@ -79,7 +81,7 @@ class Process:
 
     def __init__(self, folder: str) -> None:
         path = [os.path.abspath(place) for place in sys.path]
-        given = {"module": __name__, "path": path, **_readable(folder, path)}
+        given = {"module": SERVER, "path": path, **_readable(folder, path)}
         self._child = subprocess.Popen(
             [sys.executable, "-P", confinement.__file__, json.dumps(given)],
             env={**os.environ, "PAM_ENVS_CONTROLLERS": ""},
@@ -105,8 +107,8 @@ class Process:
             If the controller raises an error, or its process has ended.
         """
         try:
-            _send(self._child.stdin, pickle.dumps(request))
-            header, *parts = _received(self._child.stdout)
+            send(self._child.stdin, pickle.dumps(request))
+            header, *parts = received(self._child.stdout)
             said = json.loads(header)
             shapes = [(str(kind), [int(n) for n in shape]) for kind, shape in said["arrays"]]
             if not all(NUMBERS.fullmatch(kind) for kind, _ in shapes):
@@ -153,13 +155,14 @@ def _readable(folder: str, paths: list[str]) -> dict[str, list[str]]:
 
 
 def _end(child: Any) -> None:
-    child.stdin.close()
-    child.stdout.close()
     child.kill()
     child.wait()
+    for pipe in (child.stdin, child.stdout):
+        with suppress(OSError):  # a request that was not sent
+            pipe.close()
 
 
-def _send(pipe: IO[bytes] | None, *parts: bytes) -> None:
+def send(pipe: IO[bytes] | None, *parts: bytes) -> None:
     """Write parts with their number and lengths before them."""
     assert pipe is not None
     sizes = struct.pack(f"<{len(parts) + 1}Q", len(parts), *map(len, parts))
@@ -167,8 +170,8 @@ def _send(pipe: IO[bytes] | None, *parts: bytes) -> None:
     pipe.flush()
 
 
-def _received(pipe: IO[bytes] | None) -> list[bytes]:
-    """Return the parts that :func:`_send` wrote."""
+def received(pipe: IO[bytes] | None) -> list[bytes]:
+    """Return the parts that :func:`send` wrote."""
     assert pipe is not None
     (number,) = struct.unpack("<Q", pipe.read(8))
     if not 0 < number <= 3:
@@ -177,67 +180,3 @@ def _received(pipe: IO[bytes] | None) -> list[bytes]:
     if sum(sizes) > MOST:
         raise ValueError(f"{sum(sizes)} bytes")
     return [pipe.read(size) for size in sizes]
-
-
-# --- in the controller's process -----------------------------------------------------------------
-
-
-def serve(confined: bool) -> None:
-    """Answer requests from the standard input until it ends."""
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for stream in (0, 1):  # of what a controller prints or reads
-        os.dup2(nothing, stream)
-    server = Server(confined)
-    while size := requests.read(8):
-        (length,) = struct.unpack("<Q", requests.read(8 * struct.unpack("<Q", size)[0]))
-        try:
-            what, *given = pickle.loads(requests.read(length))
-            said, arrays = getattr(server, what)(*given)
-        except Exception as error:
-            text = str(error)[:LONGEST]
-            said, arrays = {"error": type(error).__name__, "message": text}, []
-        said["arrays"] = [[part.dtype.newbyteorder("<").str, part.shape] for part in arrays]
-        little = [part.astype(part.dtype.newbyteorder("<")).tobytes() for part in arrays]
-        _send(answers, json.dumps(said).encode(), *little)
-
-
-class Server:
-    """Answers of a controller's process."""
-
-    def __init__(self, confined: bool) -> None:
-        self.confined, self.state = confined, None
-        self.controller: Any = None
-        self.names: list[str] = []
-
-    def load(self, folder: str) -> Any:
-        """Import the files of a folder."""
-        from baselines.core import catalogue
-
-        self.names = catalogue.load(folder)
-        return {"confined": self.confined}, []
-
-    def list(self) -> Any:
-        """Return the descriptions of the folder's entries."""
-        from baselines.core.catalogue import CONTROLLERS
-
-        about = {n: {k: getattr(CONTROLLERS[n], k) for k in SHOWN} for n in self.names}
-        return {"entries": json.loads(json.dumps(about, default=dict))}, []
-
-    def make(self, name: str, plant: Any, signals: Any, actions: Any, knobs: Any, seed: int) -> Any:
-        """Make a controller."""
-        from baselines.core.catalogue import make_controller
-
-        self.controller = make_controller(name, plant, signals, actions, seed, knobs)
-        return {"models": hasattr(self.controller, "model_output")}, []
-
-    def predict(self, observation: Any, fresh: bool, start: Any, deterministic: bool) -> Any:
-        """Return an action and the output of the model that the controller follows."""
-        state = None if fresh else self.state
-        action, self.state = self.controller.predict(observation, state, start, deterministic)
-        output = getattr(self.controller, "model_output", None)
-        followed = np.asarray(output(self.state) if output else [], np.float64)
-        plain = np.asarray(action)
-        if isinstance(action, np.ma.MaskedArray) or plain.dtype.kind not in "biuf":
-            raise ValueError(f"action of type {type(action).__name__} is no array of numbers")
-        return {}, [plain, followed]
