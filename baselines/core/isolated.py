@@ -16,6 +16,7 @@ import subprocess
 import sys
 import warnings
 import weakref
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -28,11 +29,10 @@ from baselines.core import confinement
 from baselines.core.entry import Entry, Spec
 from pam_envs.kernels import cache
 
-SERVER = "baselines.core.controller_process"
-"""Module that answers in a controller's process."""
 MOST = 2**26  # bytes of an answer
 LONGEST = 1000  # characters of a message
 NUMBERS = re.compile(r"[<|][biuf](1|2|4|8|16)")
+SERVER = f"{__name__}_server"
 LIBRARIES = (
     *("/usr/lib", "/usr/lib64", "/usr/local/lib", "/usr/share", "/usr/bin", "/lib", "/lib64"),
     *("/bin", "/etc", "/proc", "/sys", "/dev"),
@@ -108,7 +108,7 @@ class Process:
         """
         try:
             send(self._child.stdin, pickle.dumps(request))
-            header, *parts = _received(self._child.stdout)
+            header, *parts = received(self._child.stdout)
             said = json.loads(header)
             shapes = [(str(kind), [int(n) for n in shape]) for kind, shape in said["arrays"]]
             if not all(NUMBERS.fullmatch(kind) for kind, _ in shapes):
@@ -155,10 +155,11 @@ def _readable(folder: str, paths: list[str]) -> dict[str, list[str]]:
 
 
 def _end(child: Any) -> None:
-    child.stdin.close()
-    child.stdout.close()
     child.kill()
     child.wait()
+    for pipe in (child.stdin, child.stdout):
+        with suppress(OSError):  # a request that was not sent
+            pipe.close()
 
 
 def send(pipe: IO[bytes] | None, *parts: bytes) -> None:
@@ -169,7 +170,7 @@ def send(pipe: IO[bytes] | None, *parts: bytes) -> None:
     pipe.flush()
 
 
-def _received(pipe: IO[bytes] | None) -> list[bytes]:
+def received(pipe: IO[bytes] | None) -> list[bytes]:
     """Return the parts that :func:`send` wrote."""
     assert pipe is not None
     (number,) = struct.unpack("<Q", pipe.read(8))

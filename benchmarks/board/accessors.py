@@ -98,7 +98,10 @@ def scores(row: Mapping[str, Any], metric: str = "", split: str = "") -> Scores:
     values = scores_of(episodes, metric or headline_of(content_of(row)))
     runs = [episode["training_seed"] for episode in episodes]
     pairs = [(str(episode["scenario"]), int(episode["seed"])) for episode in episodes]
-    table, order = statistics.crossed(values, runs, pairs)
+    try:
+        table, order = statistics.crossed(values, runs, pairs)
+    except ValueError as error:
+        raise ValueError(f"{row['row']}: {error}") from error
     return Scores(table, [scenario for scenario, _ in order], sorted(set(runs)))
 
 

@@ -183,7 +183,7 @@ def test_answer_in_another_format_is_an_error(
 ) -> None:
     process = isolated.Process(str(evil))
     header = json.dumps({"arrays": [[kind, shape]]}).encode()
-    monkeypatch.setattr(isolated, "_received", lambda pipe: [header, data])
+    monkeypatch.setattr(isolated, "received", lambda pipe: [header, data])
     with pytest.raises(isolated.ControllerError, match="gives no answer"):
         process.ask("list")
 

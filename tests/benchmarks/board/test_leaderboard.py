@@ -223,6 +223,15 @@ def test_verification_counts_only_for_the_row_with_its_checksum(monkeypatch, tmp
     assert words() == ["verified 2026-01-03", "not verified yet"]
 
 
+def test_message_names_the_row_with_an_unknown_citation_or_a_repeated_episode():
+    cited, repeated = fakes.row("pid", 1e-3), fakes.row("zero", 1e-3)
+    cited["controller"]["citation"] = "no key"
+    repeated["episodes"].append(repeated["episodes"][0])
+    for row, words in ((cited, "citation of pid: no key"), (repeated, f"{repeated['row']}: ")):
+        with pytest.raises(ValueError, match=words):
+            leaderboard.files([row])
+
+
 def test_text_of_a_row_is_no_html(monkeypatch):
     row = fakes.row("pid", 1e-3)
     evil = '<img src=x onerror="alert(1)">'

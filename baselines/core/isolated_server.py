@@ -1,4 +1,4 @@
-"""Controller's side of a process of its own (:mod:`baselines.core.isolated`)."""
+"""Answers of the process of a controller from outside the package."""
 
 import json
 import os
