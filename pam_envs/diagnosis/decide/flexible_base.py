@@ -156,6 +156,12 @@ class FlexibleBase:
         amounts = [t for _, form in causes for t in form.terms if t.amount]
         return {t.name: float(neutral[self.family.free(t.name).place]) for t in amounts}
 
+    def plain(self, fit: lsq.Fit) -> Array:
+        """Return the plain plant's parameters in the coordinates of a fit; some are not finite."""
+        neutral = self.family.column
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.array([f.inner(neutral[f.place]) for f in fit.frees])
+
     def needed(self, model: Candidate) -> Candidate:
         """Return a model without the common differences that the recording does not need.
 
@@ -196,15 +202,13 @@ class FlexibleBase:
         complete_jacobian(self.problem, model.fit)
         normal, _ = lsq.normal_equations(self.problem, model.fit)
         spread = np.linalg.pinv(normal, hermitian=True)
-        fit, neutral, found = model.fit, self.family.column, {}
+        fit, plain, found = model.fit, self.plain(model.fit), {}
         names = [f.name for f in fit.frees]
         for cause, form in model.causes:
             places = [names.index(t.name) for t in form.terms if t.amount and t.name in names]
             if not cause.common or not places:
                 continue
-            frees = [fit.frees[k] for k in places]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                moved = np.array([f.inner(neutral[f.place]) for f in frees]) - fit.z[places]
+            moved = plain[places] - fit.z[places]
             if not np.isfinite(moved).all():
                 found[cause.name] = 0.0
                 continue
@@ -239,18 +243,13 @@ class FlexibleBase:
         the other by a linear model of the residual.
         """
         complete_jacobian(self.problem, model.fit)
-        fit, neutral = model.fit, self.family.column
+        fit, plain, neutral = model.fit, self.plain(model.fit), self.family.column
         normal, _ = lsq.normal_equations(self.problem, fit)
         known = {f.name for f in self.base.fit.frees}
-        with np.errstate(divide="ignore", invalid="ignore"):
-            plain = np.array([f.inner(neutral[f.place]) for f in fit.frees])
         free = [k for k, f in enumerate(fit.frees) if f.name not in known and np.isfinite(plain[k])]
         limit = SHOWN**2 * max(1.0, fit.cost / self.problem.sampled)
-        kept, z, spread = (
-            np.ones(len(plain), bool),
-            fit.z.copy(),
-            np.linalg.pinv(normal, hermitian=True),
-        )
+        kept, z = np.ones(len(plain), bool), fit.z
+        spread = np.linalg.pinv(normal, hermitian=True)
         while free:
             off = z[free] - plain[free]
             worse = off**2 / np.maximum(np.diag(spread)[free], 1e-300)
@@ -258,7 +257,7 @@ class FlexibleBase:
             if worse[least] > limit:
                 break
             k = free.pop(least)
-            row = spread[k].copy()
+            row = spread[k]
             z = z - row / row[k] * off[least]
             spread = spread - np.outer(row, row) / row[k]
             kept[k] = False

@@ -103,9 +103,8 @@ def oscillates_still(before: Mapping[str, Any], after: Mapping[str, Any], rule: 
 
     Heights are relative to a neighbourhood, which falls with the mean square of the channel.
     """
-    channels = ("peaks", "by_channel")
     rows = zip(
-        *(before[name] for name in channels), *(after[name] for name in channels), strict=True
+        before["peaks"], before["by_channel"], after["peaks"], after["by_channel"], strict=True
     )
     return any(
         was > rule.peak

@@ -62,16 +62,17 @@ BREAKS = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
 PAIRS = {"set_point_a": "pressure_a", "set_point_b": "pressure_b"}
 
 
-def difference_of(family: RegulatedFamily, recording: Recording, outputs: Array) -> Signals:
-    """Return the angle and the difference of the pressures, channels 0 to 2."""
-    first, second = family.setpoints(recording)
+def difference_of(
+    recording: Recording, command: Array, angle: Array, pressures: Array, joint: str = ""
+) -> Signals:
+    """Return an angle and the difference of two pressures (2, T), whose setpoint is ``command``."""
     load = recording.inputs.get("payload", np.zeros(len(recording.time))) * GRAVITY
     return Signals(
         "pressure_difference",
-        first - second,
-        np.array([outputs[0], outputs[1] - outputs[2]]),
+        command,
+        np.array([angle, pressures[0] - pressures[1]]),
         load,
-        label="pressure difference [bar]",
+        label=f"pressure difference{joint} [bar]",
         scale=BAR,
     )
 
@@ -87,14 +88,15 @@ class BoundJoint(RegulatedFamily):
 
     def signals(self, recording: Recording, outputs: Array) -> Signals:
         """Return the angle and the difference of the pressures."""
-        return difference_of(self, recording, outputs)
+        first, second = self.setpoints(recording)
+        return difference_of(recording, first - second, outputs[0], outputs[1:3])
 
 
 class JointKind(RegulatedKind):
     """Joint between two antagonistic muscles."""
 
-    plant = AntagonisticJoint
-    bound = BoundJoint
+    plant: ClassVar[Any] = AntagonisticJoint
+    bound: ClassVar[type[RegulatedFamily]] = BoundJoint
     sizes: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "rest_length": ("muscle.rest_length",),
         "diameter": ("muscle.diameter",),
@@ -107,6 +109,6 @@ class JointKind(RegulatedKind):
     def drives(
         self, plant: Any, recording: Recording, set_points: Sequence[Array]
     ) -> Mapping[str, Array]:
-        """Return the pressures, at which the joint also begins at rest."""
-        named = {"pressure_a": set_points[0], "pressure_b": set_points[1]}
+        """Return the pressures, at which the plant also begins at rest."""
+        named = dict(zip(self.pairs_of(plant).values(), set_points, strict=True))
         return named | {"direct": np.full(len(recording.time), FROM_THEM)}

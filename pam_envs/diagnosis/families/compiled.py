@@ -22,7 +22,7 @@ from pam_envs.diagnosis.fit.least_squares import (
     Problem,
     column_of,
 )
-from pam_envs.diagnosis.fit.single_muscle import PILOT, identified
+from pam_envs.diagnosis.fit.single_muscle import PILOT, SETTINGS, identified
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.parameters import Declaration
 from pam_envs.plants.core.plant import Plant
@@ -35,10 +35,7 @@ ROUNDS, VALVE_ROUNDS = 25, 12
 INSTANT = {"dead_time": 0.0, "slew_rate": 1e9, "gain": 1.0}
 """Parameters of a regulator whose pressures are the measured ones."""
 PILOT_LAG = "regulator.pilot_lag"
-PILOTS: dict[str, dict[str, Any]] = {
-    PILOT_LAG: {"log": True, "low": 2e-3, "prior": 2.0},
-    "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
-}
+PILOTS = {name: SETTINGS[name] for name in PILOT}
 """Settings of the fit of a regulator's pilot stage."""
 LEAST_LAG = 2e-3
 """Least time constant of a regulator [s]."""

@@ -61,11 +61,8 @@ class BoundElbow(RegulatedFamily):
 
     def signals(self, recording: Recording, outputs: Array) -> Signals:
         """Return the angle and the difference of the pressures, positive in flexion."""
-        found = difference_of(self, recording, outputs)
-        flexing = np.array([[1.0], [-1.0]]) * found.outputs
-        return Signals(
-            found.drive, -found.command, flexing, found.load, label=found.label, scale=found.scale
-        )
+        first, second = self.setpoints(recording)
+        return difference_of(recording, second - first, outputs[0], outputs[2:0:-1])
 
 
 class ElbowKind(RegulatedKind):

@@ -4,21 +4,24 @@ All joints have the same muscles and regulators, and so the same causes. An arm 
 the default's is given as a plant.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from pam_envs.arrays import Array
-from pam_envs.constants import BAR, GRAVITY
 from pam_envs.data.recording.channels import arm_channels
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.families.antagonistic_joint import FACTORS, MUSCLES, TITLES, UNEQUAL
-from pam_envs.diagnosis.families.regulated import RegulatedFamily, RegulatedKind
+from pam_envs.diagnosis.families.antagonistic_joint import (
+    MUSCLES,
+    UNEQUAL,
+    JointKind,
+    difference_of,
+)
+from pam_envs.diagnosis.families.regulated import RegulatedFamily
 from pam_envs.diagnosis.plant_protocol import Signals
-from pam_envs.plants.antagonistic_joint.rollout import FROM_THEM
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import JOINT_OUTPUTS, MUSCLE_OUTPUTS
 
@@ -56,38 +59,17 @@ class BoundArm(RegulatedFamily):
         apart = [a - b for a, b in zip(commands[::2], commands[1::2], strict=True)]
         k, n = int(np.argmax([np.ptp(v) for v in apart])), self.plant.stages
         first = n + 2 * k
-        load = recording.inputs.get("payload", np.zeros(len(recording.time))) * GRAVITY
-        return Signals(
-            "pressure_difference",
-            apart[k],
-            np.array([outputs[k], outputs[first] - outputs[first + 1]]),
-            load,
-            label=f"pressure difference of joint {k} [bar]",
-            scale=BAR,
-        )
+        pressures = outputs[first : first + 2]
+        return difference_of(recording, apart[k], outputs[k], pressures, f" of joint {k}")
 
 
-class ArmKind(RegulatedKind):
+class ArmKind(JointKind):
     """Arm of joints between antagonistic muscles."""
 
     plant = RedundantManipulator
     bound = BoundArm
-    sizes: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "rest_length": ("muscle.rest_length",),
-        "diameter": ("muscle.diameter",),
-    }
-    renamed = ({"position": "angle", "mass": "link"},)
-    factors = FACTORS
-    titles = TITLES
     catalogue = (*catalogue(), UNEQUAL)
 
     def pairs_of(self, plant: Any) -> Mapping[str, str]:
         """Return the name of each setpoint and that of its pressure."""
         return arm_channels(plant.stages).measured
-
-    def drives(
-        self, plant: Any, recording: Recording, set_points: Sequence[Array]
-    ) -> Mapping[str, Array]:
-        """Return the pressures, at which the arm also begins at rest."""
-        named = {f"pressure_{m}": values for m, values in enumerate(set_points)}
-        return named | {"direct": np.full(len(recording.time), FROM_THEM)}

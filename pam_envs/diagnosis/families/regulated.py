@@ -23,14 +23,14 @@ from pam_envs.diagnosis.families.compiled import (
 )
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration
+from pam_envs.diagnosis.fit.single_muscle import SETTINGS
 from pam_envs.diagnosis.fit.starting_values import Grid
 from pam_envs.diagnosis.plant_protocol import Output
 from pam_envs.plants.core.rollout import drives_of
 from pam_envs.wording import near
 
 REGULATOR: dict[str, dict[str, Any]] = {
-    "regulator.gain": {"scale": 0.01},
-    "regulator.time_constant": {"log": True, "prior": 1.5},
+    **{name: SETTINGS[name] for name in ("regulator.gain", "regulator.time_constant")},
     "regulator.dead_time": {"scale": 0.01},
     "regulator.slew_rate": {"log": True, "high": 1e8, "prior": 2.0},
 }

@@ -221,11 +221,12 @@ def orifices(
     """
     other = dataclasses.replace(family, plant=orifices_of(family.plant))
     full = family.plant.regulator.max_pressure
+    columns = [other.column, column_with(other, law)] if law else [other.column]
     fits = []
     for size, source in product(CONDUCTANCES, (1.05 * full, 1.5 * full)):
         begin = {"regulator.conductance": size, "regulator.source_pressure": source}
         frees = start_at_guess(regulator_of(other), begin)
-        fits += [Fit.at_start(frees, column_with(other, known)) for known in ({}, law)]
+        fits += [Fit.at_start(frees, column) for column in columns]
     only = dataclasses.replace(of_pressure(problem), simulate=other.simulate, tie=other.tie)
     flow = simplest(only, blocks, promising(only, fits), FLOW_ROUNDS)
     before = blocks.errors(only.rows(fit.residual))
