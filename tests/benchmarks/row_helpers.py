@@ -28,12 +28,18 @@ TINY: dict[str, Any] = {
 }
 
 
-@contextmanager
-def place(folder: Path) -> Iterator[Path]:
-    """Make a folder of policies, scenarios and rounds, which the harness then uses."""
+def furnish(folder: Path) -> None:
+    """Write a scenario, policies and tuned settings into a folder."""
     (folder / "tiny.yaml").write_text(yaml.safe_dump(TINY))
     bench_fakes.write_policies(folder / "policies", *GAINS)
     bench_fakes.write_knobs(folder / "policies")
+
+
+@contextmanager
+def place(folder: Path) -> Iterator[Path]:
+    """Make a folder of policies, scenarios and rounds, which the harness then uses."""
+    if not (folder / "tiny.yaml").exists():
+        furnish(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(controllers, "SOURCES", ("bench_fakes",))
         patch.setattr(bench_fakes, "POLICIES", folder / "policies")
