@@ -14,9 +14,12 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "7"  # part of every report
+    version: str = "8"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
+    # the same on a rig whose law or friction differs from the base: a smaller gain may correct what
+    # is left of that difference
+    differing_gain: float = 0.3
     trial_penalty: float = (
         0.01  # multiple-comparison penalty: gain lost for each factor e of trials
     )
@@ -40,9 +43,7 @@ class Rule:
     # gain of a common difference from the base (another law, another drive of the friction) above
     # which it is named; a smaller one is a calibration
     common_gain: float = 0.3
-    # gain of a cause that is like another law, on a rig whose law or friction differs from the
-    # base: of the first cause, and of a common difference or a further cause, which corrects others
-    lawlike_gain: float = 0.3
+    # gain of a common difference or a further cause that is like another law
     lawlike_further: float = 1.0
     # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
     # this share of the gain of a model that leaves only noise: otherwise it corrects the first form
@@ -79,12 +80,16 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
     """Return the verdict on evidence (``pam_envs.diagnosis.decide.verdict.Ladder.evidence``)."""
     levels = evidence["levels"]
     least = max(rule.least_gain, rule.least_total / max(1, evidence["blocks"]))
+    if evidence.get("differs", False):
+        least = max(least, rule.differing_gain)
     if len(levels) < 2 or not is_accepted(levels[1], least, rule):
         return Judgement("unexplained" if has_structure(levels[0]["left"], rule) else "adequate", 0)
     level, first = 1, levels[1]["gain"]
     while level + 1 < len(levels) and level < rule.most:
         required = max(least, required_gain(first, levels[level + 1]["possible"], rule))
-        if not is_accepted(levels[level + 1], required, rule, rule.lawlike_further):
+        if levels[level + 1].get("lawlike", False):
+            required = max(required, rule.lawlike_further)
+        if not is_accepted(levels[level + 1], required, rule):
             break
         level += 1
     found = levels[level]
@@ -128,16 +133,9 @@ def required_gain(first: float, possible: float, rule: Rule) -> float:
     return max(rule.second_gain, min(ways))
 
 
-def is_accepted(
-    level: Mapping[str, Any], required: float, rule: Rule, lawlike: float | None = None
-) -> bool:
-    """Return whether a further cause has the required gain, and a significant one.
-
-    One that is like another law needs the gain ``lawlike``, by default that of a first cause.
-    """
-    lawlike = rule.lawlike_gain if lawlike is None else lawlike
-    least = max(required, lawlike) if level.get("lawlike", False) else required
-    return bool(level["added"] >= least and level["unsure"] <= rule.doubt)
+def is_accepted(level: Mapping[str, Any], required: float, rule: Rule) -> bool:
+    """Return whether a further cause has the required gain, and a significant one."""
+    return bool(level["added"] >= required and level["unsure"] <= rule.doubt)
 
 
 def explained_fraction(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:

@@ -176,21 +176,21 @@ class Ladder:
     def evidence(self, levels: Sequence[Level]) -> dict[str, Any]:
         """Return the input of the rule, in plain types.
 
-        ``blocks`` is the number of held-out blocks. ``levels`` has one entry for each number of
-        causes from none: ``gain`` over the base, ``added`` over the level before, the ``possible``
-        gain if only noise were left, the p-value (``unsure``), the remaining structure (``left``)
-        whether the added cause is like another law on a rig with another law (``lawlike``), and the
-        ``rivals``, best first, each with ``names``, ``forms``, ``gain``, ``better`` (share
-        of bootstrap samples in which it beats the best), ``imitates`` (it contains the best as a
-        limit) and ``out`` (excluded before the cross-validation).
+        ``blocks`` is the number of held-out blocks, and ``differs`` whether law or friction of the
+        rig differ from those of a plain plant. ``levels`` has one entry for each number of causes
+        from none: ``gain`` over the base, ``added`` over the level before, the ``possible`` gain if
+        only noise were left, the p-value (``unsure``), the remaining structure (``left``), whether
+        the added cause is like another law (``lawlike``), and the ``rivals``, best first, each with
+        ``names``, ``forms``, ``gain``, ``better`` (share of bootstrap samples in which it beats the
+        best), ``imitates`` (it contains the best as a limit) and ``out`` (excluded before the
+        cross-validation).
         """
         draws = self.blocks.draws(self.rule.draws, self.seed)
         made = []
         for k, level in enumerate(levels):
             before = levels[max(k - 1, 0)].model
             further = [c for c, _ in level.model.causes if c.name not in before.names]
-            differs = k > 1 or self.differs()
-            lawlike = bool(further) and differs and all(c.lawlike for c in further)
+            lawlike = bool(further) and all(c.lawlike for c in further)
             made.append(
                 {
                     "gain": self.gain(level.model),
@@ -207,7 +207,8 @@ class Ladder:
                     ],
                 }
             )
-        return {"blocks": int(self.blocks.held_out.sum()), "levels": made}
+        blocks = int(self.blocks.held_out.sum())
+        return {"blocks": blocks, "differs": self.differs(), "levels": made}
 
     def row(
         self,

@@ -84,12 +84,18 @@ def test_few_blocks_require_a_larger_gain(blocks, verdict):
 
 
 @pytest.mark.parametrize(
-    ("gain", "lawlike", "verdict"),
+    ("gain", "differs", "verdict"),
     [(0.2, True, "adequate"), (0.2, False, "named"), (0.5, True, "named")],
 )
-def test_a_cause_like_another_law_needs_more_on_a_rig_with_another_law(gain, lawlike, verdict):
-    found = evidence(level(gain, LEAK) | {"lawlike": lawlike})
+def test_a_rig_that_differs_from_the_base_requires_a_larger_gain(gain, differs, verdict):
+    found = evidence(level(gain, LEAK)) | {"differs": differs}
     assert judge(found, RULE).verdict == verdict
+
+
+@pytest.mark.parametrize(("added", "number"), [(0.7, 1), (1.2, 2)])
+def test_a_further_cause_like_another_law_requires_a_larger_gain(added, number):
+    further = level(3.0 + added, BOTH, added=added, lawlike=True)
+    assert judge(evidence(level(3.0, LEAK), further), RULE).level == number
 
 
 @pytest.mark.parametrize(
