@@ -498,7 +498,7 @@ def diagnosis(
     kind: tuple[str, ...] = (),
     name: tuple[str, ...] = (),
     world: tuple[str, ...] = (),
-    each: int = 0,
+    each: dict[str, int] | None = None,
     loops: int = 0,
     next: bool = False,
     force: bool = False,
@@ -516,7 +516,8 @@ def diagnosis(
         kind: Only cases of these kinds.
         name: Only cases with one of these hidden effects.
         world: Only rigs of these worlds.
-        each: Only so many cases of every kind in each world.
+        each: Only these kinds, and so many cases of each in each world (of single effects: of each
+            effect), as in "--each single 1 clean 6".
         loops: Number of cases per cause that are run in closed loop on the hidden rig.
         next: Run the proposed experiments.
         force: Compute stored cases again.
@@ -536,7 +537,7 @@ def diagnosis(
 
     folder = running.FOLDER if cells is None else cells
     options = running.Options(
-        *(chosen, offset, kind, name, loops, next, force, folder, computing, world, each)
+        *(chosen, offset, kind, name, loops, next, force, folder, computing, world, each or {})
     )
     with progress("cases") as start:
         report = running.run(options, start, mutilated.study if chosen == "mutilated" else study)

@@ -5,7 +5,7 @@ computed again for another version of the rule. A failed case also has a record 
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, field
 from functools import cache, partial
 from pathlib import Path
@@ -74,7 +74,7 @@ class Options:
     folder: Path = FOLDER
     computing: Computing = ONE_JOB
     worlds: tuple[str, ...] = ()
-    each: int = 0  # number of cases of every kind in each world; 0 for all
+    each: Mapping[str, int] = field(default_factory=dict)  # cases of a kind in each world
 
     @property
     def whole(self) -> bool:
@@ -86,7 +86,8 @@ class Options:
         """Arguments of the command that gives the same records."""
         given: dict[str, Any] = {"chosen": self.chosen, "offset": self.offset or None}
         given |= {"kind": " ".join(self.kinds), "name": " ".join(self.names)}
-        given |= {"world": " ".join(self.worlds), "each": self.each or None}
+        each = " ".join(f"{kind} {number}" for kind, number in self.each.items())
+        given |= {"world": " ".join(self.worlds), "each": each}
         given["loops"] = self.loops or None
         words = [f"--{name} {value}" for name, value in given.items() if value not in (None, "")]
         return " ".join(words + ["--next"] * self.next)
@@ -132,7 +133,7 @@ def _drawn(options: Options) -> list[Case]:
     if options.chosen == "mutilated":
         return mutilated.cases(options.offset)
     if options.each:
-        raise ValueError(f"each = {options.each} is for the set worlds; leave it out")
+        raise ValueError("--each is for the set worlds; leave it out")
     return cases(options.chosen, options.offset)
 
 

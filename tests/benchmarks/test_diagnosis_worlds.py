@@ -51,14 +51,17 @@ def test_every_world_has_every_effect_four_times_and_fifty_clean_rigs():
 
 def test_part_of_the_study_has_the_cases_of_the_whole():
     whole = set(cases())
-    few = cases(each=1)
+    few = cases(each={"single": 1, "clean": 6})
     assert set(few) <= whole
-    assert Counter(case.kind for case in few)["single"] == len(WORLDS) * len(EFFECTS)
+    number = {"single": len(WORLDS) * len(EFFECTS), "clean": 6 * len(WORLDS)}
+    assert Counter(case.kind for case in few) == number
     chosen = select(Options("worlds", kinds=("clean",), worlds=(THEIRS,)))
     assert len(chosen) == 50 and {case.world for case in chosen} == {THEIRS}
     assert not {case.seed for case in cases(1)} & {case.seed for case in whole}
-    with pytest.raises(ValueError, match="each = 2 is for the set worlds"):
-        select(Options("small", each=2))
+    with pytest.raises(ValueError, match="--each is for the set worlds"):
+        select(Options("small", each={"single": 2}))
+    with pytest.raises(ValueError, match=r"--each clean 51: there are .*clean \(at most 50\)"):
+        select(Options("worlds", each={"clean": 51}))
     with pytest.raises(ValueError, match="no world is called 'mars'"):
         select(Options("worlds", worlds=("mars",)))
 

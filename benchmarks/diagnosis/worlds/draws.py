@@ -4,7 +4,7 @@ Every world has the same numbers of cases. Seeds depend on offset, world and kin
 part of the study has the cases of the whole. Offset 0 is frozen: development uses another offset.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations, islice
 
@@ -27,15 +27,25 @@ WORLD_SEEDS, KIND_SEEDS = 10_000, 1_000  # numbers of seeds of a world, and of a
 Draw = Callable[[int, int, np.random.Generator], Iterator[Case]]
 
 
-def cases(offset: int = 0, each: int = 0) -> list[Case]:
-    """Return the cases; with ``each`` only the first of every kind in each world."""
+def cases(offset: int = 0, each: Mapping[str, int] | None = None) -> list[Case]:
+    """Return the cases; with ``each`` only the first so many of its kinds in each world.
+
+    Raises
+    ------
+    ValueError
+        If a kind does not exist, or has fewer cases.
+    """
+    for kind, number in (each or {}).items():
+        if not 0 <= number <= EACH.get(kind, -1):
+            known = ", ".join(f"{name} (at most {most})" for name, most in EACH.items())
+            raise ValueError(f"--each {kind} {number}: there are {known}")
     made: list[Case] = []
     for i, world in enumerate(WORLDS):
         for k, kind in enumerate(EACH):
             start = first_seed("worlds", offset) + WORLD_SEEDS * i + KIND_SEEDS * k
             drawn = DRAWS[kind](i, EACH[kind], np.random.default_rng(start))
             numbered = [replace(c, world=world, seed=start + n) for n, c in enumerate(drawn)]
-            made += _first(numbered, each) if each else numbered
+            made += _first(numbered, each.get(kind, 0)) if each else numbered
     return made
 
 
