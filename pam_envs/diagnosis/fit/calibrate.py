@@ -35,6 +35,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
     states_of,
 )
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.flow import REPLACED
 
@@ -94,13 +95,16 @@ def calibrate(
     plays = family.plant.hysteresis.model.kind == PlayOperator.kind
     moved = np.isfinite(measured[0]).any() and plays
     if np.isfinite(measured[1]).any():
-        family, fit = regulator(problem, family, blocks, rates)
-        if may_flow(problem, blocks, family, fit):
+        plain_air, fit = regulator(problem, family, blocks, rates)
+        misfit = lacks(problem, blocks, fit)
+        family, fit = slow_tail(problem, plain_air, blocks, fit) if misfit else (plain_air, fit)
+        if misfit and can_flow(plain_air) and lacks(problem, blocks, fit):
             rough: dict[str, float] = {}
             if moved:
                 balance = Balance.of(family, measured[0], smoothed(pressure, time), noise[0])
                 rough = balance.flexible() if balance is not None else {}
-            family, fit = orifices(problem, family, blocks, fit, rough)
+            flowing, flow = orifices(problem, plain_air, blocks, fit, rough)
+            family, fit = (family, fit) if flow is fit else (flowing, flow)
         found |= fit.values()
         rate = next((r for r in rates if all(t.name in found for t in r.terms)), None)
         if family.plant.air == "regulator" and found[LAG] < FAST:
@@ -160,8 +164,15 @@ def replayed_by(family: MuscleFamily, problem: Problem) -> Problem:
 ORDER_GAIN = 0.05
 """Gain on held-out pressures that a regulator of higher order needs."""
 FITS, FLOW_GAIN = 1.5, 0.2
-"""Mean square of the pressure's residual over its noise below which no flow is tried, and the gain
-that it needs."""
+"""Mean square of the pressure's residual over its noise below which nothing more is tried, and the
+gain that flow through orifices needs."""
+TAIL, TAIL_FREQUENCY = "regulator.ring_share", "regulator.ring_frequency"
+TAIL_DAMPING = 2.0
+"""Damping ratio with which the line of a regulator gives a slow share of the pressure."""
+TAIL_FREQUENCIES, TAIL_FASTEST = (0.6, 1.0), 2.0
+"""Frequencies [Hz] at which a fit of that share starts, and the largest one."""
+TAIL_GAIN = 0.3
+"""Gain that it needs."""
 CONDUCTANCES = (1e-10, 8e-10)
 """Conductances [m3/(s Pa)] at which a fit starts."""
 
@@ -204,12 +215,39 @@ def of_pressure(problem: Problem) -> Problem:
     return dataclasses.replace(problem, measured=alone, violations=no_violations, checks=0)
 
 
-def may_flow(problem: Problem, blocks: Blocks, family: MuscleFamily, fit: Fit) -> bool:
-    """Return whether flow through orifices may explain what a regulator leaves of the pressure."""
-    if family.plant.air == "flow" or not can_flow(family):
-        return False
+def lacks(problem: Problem, blocks: Blocks, fit: Fit) -> bool:
+    """Return whether a regulator leaves more of the pressure than noise."""
     left = blocks.errors(of_pressure(problem).rows(fit.residual))
     return bool(blocks.means(left)[1] >= FITS)
+
+
+def slow_tail(
+    problem: Problem, family: MuscleFamily, blocks: Blocks, fit: Fit
+) -> tuple[MuscleFamily, Fit]:
+    """Return the plant with a share of the pressure that follows slowly, if clearly better.
+
+    Air that flows into dead volumes, or an integrating pilot, gives such a tail.
+    """
+    plant = family.plant
+    if any(plant.value(name) != plant.neutral[name] for name in (TAIL, "regulator.ring_flow")):
+        return family, fit
+    overdamped = {"regulator.ring_damping": TAIL_DAMPING}
+    other = dataclasses.replace(family, plant=plant.replace(overdamped))
+    column = column_of(fit, fit.z)
+    column[R.place("regulator.ring_damping")] = TAIL_DAMPING
+    frees = start_at_guess(fit.frees, fit.values())
+    share = other.free(TAIL, start=0.05, high=0.5, scale=0.02)
+    fits = []
+    for hertz in TAIL_FREQUENCIES:
+        turns = other.free(TAIL_FREQUENCY, start=hertz, high=TAIL_FASTEST, log=True)
+        fits.append(Fit.at_start((*frees, share, turns), column))
+    only = of_pressure(problem)
+    made = simplest(only, blocks, fits)
+    before = blocks.errors(only.rows(fit.residual))
+    if blocks.gain(before, blocks.errors(only.rows(made.residual))) < TAIL_GAIN:
+        return family, fit
+    values = {name: made.values()[name] for name in (TAIL, TAIL_FREQUENCY)}
+    return dataclasses.replace(other, plant=other.plant.replace(values)), made
 
 
 def orifices(
