@@ -12,7 +12,7 @@ from pam_envs.kernels.machine_code import BUSY, Source, is_busy
 
 def main() -> int:
     """Write IR and object code of a kernel; return the exit code."""
-    if hasattr(os, "nice"):
+    if "--background" in sys.argv[1:] and hasattr(os, "nice"):
         os.nice(10)
     source: Source = pickle.load(sys.stdin.buffer)
     kernel = source.by_address

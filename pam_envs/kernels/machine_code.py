@@ -140,7 +140,7 @@ class MachineCode:
             self._child = None
         if is_busy(kernel.busy_file):
             return True
-        self._child = start(self._source)
+        self._child = start(self._source, background=True)
         if self._child is None:
             return False
         announce(
@@ -183,8 +183,11 @@ def is_busy(mark: Path) -> bool:
         return False
 
 
-def start(source: Source) -> "subprocess.Popen[bytes] | None":
-    """Start a process that compiles a kernel into the cache; None if that is impossible."""
+def start(source: Source, background: bool = False) -> "subprocess.Popen[bytes] | None":
+    """Start a process that compiles a kernel into the cache; None if that is impossible.
+
+    In the background it has a low priority; one that is waited for has not.
+    """
     from pam_envs.kernels.intermediate import GENERIC
 
     try:
@@ -195,7 +198,7 @@ def start(source: Source) -> "subprocess.Popen[bytes] | None":
     environment = {**os.environ, **GENERIC, "PYTHONPATH": path, "PAM_ENVS_CACHE": str(FOLDER)}
     try:
         child = subprocess.Popen(
-            [sys.executable, "-m", "pam_envs.kernels.ahead"],
+            [sys.executable, "-m", "pam_envs.kernels.ahead", *["--background"] * background],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
