@@ -34,7 +34,7 @@ class Rule:
     explained: float = 0.5
     lasting: float = 0.5
     explained_with_peak: float = 0.9
-    # mean square over the noise of a channel above which a cause must explain its share there too
+    # mean square over the noise of a pressure above which a cause must explain its share there too
     lost: float = 3.0
     # a rival within this share of the best gain, or this far below it, is not excluded, unless the
     # difference is significant at the level of doubt (one-sided, block bootstrap)
@@ -99,7 +99,7 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
         lasts = oscillates_still(levels[0]["left"], found["left"], rule)
         if explained_fraction(levels[0], found) < (
             rule.explained_with_peak if lasts else rule.explained
-        ) or is_lost(levels[0], found, rule):
+        ) or is_lost(levels[0], found, evidence.get("driving", ()), rule):
             return Judgement("unexplained", level)
     still = not_excluded(found["rivals"], rule)
     return Judgement("ambiguous" if still else "named", level, still)
@@ -150,14 +150,16 @@ def explained_fraction(before: Mapping[str, Any], after: Mapping[str, Any]) -> f
     return max(shares, default=np.inf)
 
 
-def is_lost(before: Mapping[str, Any], after: Mapping[str, Any], rule: Rule) -> bool:
-    """Return whether a channel keeps most of what a plant without the causes left, and it is large.
+def is_lost(
+    before: Mapping[str, Any], after: Mapping[str, Any], driving: Sequence[int], rule: Rule
+) -> bool:
+    """Return whether a channel that drives the others keeps most of a large misfit.
 
-    A model that misses it so far may have causes that only make up for it in another channel.
+    Causes that leave it may only make up for it in another channel.
     """
-    pairs = zip(before["left"]["by_channel"], after["left"]["by_channel"], strict=True)
+    pairs = [(level["left"]["by_channel"][k] for level in (before, after)) for k in driving]
     return any(
-        now > rule.lost and (now - 1.0) > (1.0 - rule.explained) * (was - 1.0) for was, now in pairs
+        now > rule.lost and now - 1.0 > (1.0 - rule.explained) * (was - 1.0) for was, now in pairs
     )
 
 

@@ -177,13 +177,13 @@ class Ladder:
         """Return the input of the rule, in plain types.
 
         ``blocks`` is the number of held-out blocks, and ``differs`` whether law or friction of the
-        rig differ from those of a plain plant. ``levels`` has one entry for each number of causes
-        from none: ``gain`` over the base, ``added`` over the level before, the ``possible`` gain if
-        only noise were left, the p-value (``unsure``), the remaining structure (``left``), whether
-        the added cause is like another law (``lawlike``), and the ``rivals``, best first, each with
-        ``names``, ``forms``, ``gain``, ``better`` (share of bootstrap samples in which it beats the
-        best), ``imitates`` (it contains the best as a limit) and ``out`` (excluded before the
-        cross-validation).
+        rig differ from those of a plain plant. ``driving`` are the channels that drive the others.
+        ``levels`` has one entry for each number of causes from none: ``gain`` over the base,
+        ``added`` over the level before, the ``possible`` gain if only noise were left, the p-value
+        (``unsure``), the remaining structure (``left``), whether the added cause is like another
+        law (``lawlike``), and the ``rivals``, best first, each with ``names``, ``forms``,
+        ``gain``, ``better`` (share of bootstrap samples in which it beats the best), ``imitates``
+        (it contains the best as a limit) and ``out`` (excluded before the cross-validation).
         """
         draws = self.blocks.draws(self.rule.draws, self.seed)
         made = []
@@ -207,8 +207,12 @@ class Ladder:
                     ],
                 }
             )
-        blocks = int(self.blocks.held_out.sum())
-        return {"blocks": blocks, "differs": self.differs(), "levels": made}
+        return {
+            "blocks": int(self.blocks.held_out.sum()),
+            "differs": self.differs(),
+            "driving": [k for k, c in enumerate(self.family.channels) if c.startswith("pressure")],
+            "levels": made,
+        }
 
     def row(
         self,

@@ -106,6 +106,10 @@ class PlantFamily(Protocol):
     """A plant with fixed inputs that can be diagnosed; see also :attr:`Problem.tie`."""
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+
+    @property
     def column(self) -> Array:
         """Parameters of the plain plant, shape (p,)."""
 

@@ -121,6 +121,23 @@ def test_an_oscillation_that_lasts_is_unexplained(was, peak, hertz, excess, verd
     assert judge(found, RULE).verdict == verdict
 
 
+@pytest.mark.parametrize(
+    ("was", "now", "verdict"),
+    [
+        (8.0, 7.0, "unexplained"),  # what the pressure does is still unknown
+        (8.0, 2.0, "named"),
+        (2.5, 2.4, "named"),  # it was nearly known before
+    ],
+)
+def test_a_cause_that_leaves_the_pressure_unexplained_is_not_named(was, now, verdict):
+    before, after = left(excess=10.0), left(excess=1.2)
+    before["by_channel"], after["by_channel"] = [10.0, was], [1.2, now]
+    after["excess"] = max(1.2, now)
+    found = evidence(level(2.0, LEAK, left=after), before=before)
+    assert judge(found | {"driving": [1]}, RULE).verdict == verdict
+    assert judge(found, RULE).verdict == "named"
+
+
 @pytest.mark.parametrize(("after", "verdict"), [(2.0, "named"), (6.0, "unexplained")])
 def test_remaining_structure_decides_between_named_and_unexplained(after, verdict):
     found = evidence(level(1.0, LEAK, left=left(excess=after)), before=left(excess=10.0))
