@@ -24,7 +24,9 @@ class Buffer:
         return Buffer(ptr, size, owner)
 
     def bytes(self) -> np.ndarray:
-        return np.ctypeslib.as_array((ctypes.c_uint8 * self.size).from_address(self.handle))
+        raw: Any = (ctypes.c_uint8 * self.size).from_address(self.handle)
+        raw.buffer = self  # which lives as long as its arrays
+        return np.ctypeslib.as_array(raw)
 
     def copy_from(self, source: Buffer, *, stream: Any) -> None:
         assert stream is STREAM
