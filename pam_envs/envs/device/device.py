@@ -84,18 +84,3 @@ class HostDevice:
 
     def synchronise(self) -> None:
         """Do nothing: a launch returns when it is done."""
-
-
-def device_of(name: str) -> Device:
-    """Return the device of a name: "host", "cuda", or "cuda:1" for the second GPU."""
-    kind, _, number = name.partition(":")
-    if name == "host":
-        return HostDevice()
-    if kind == "cuda" and (number.isdigit() or name == "cuda"):
-        from pam_envs.envs.device.cuda import CudaDevice
-
-        return CudaDevice(int(number or 0))
-    raise ValueError(
-        f"device = {name!r} is not known; choose 'cpu', 'cuda', 'cuda:1' (the second GPU), or "
-        "'host' (the kernels of the GPU on the processor, for tests)"
-    )

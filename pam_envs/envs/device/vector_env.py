@@ -11,7 +11,8 @@ from pam_envs.envs.core.batch import Batch
 from pam_envs.envs.core.lanes import PARTS, LaneKernel
 from pam_envs.envs.core.setup import Setup, check_choice
 from pam_envs.envs.core.step import EPISODE
-from pam_envs.envs.device.device import Device, device_of
+from pam_envs.envs.device.cuda import CudaDevice
+from pam_envs.envs.device.device import Device, HostDevice
 from pam_envs.kernels.build import COMPILED
 from pam_envs.kernels.random import seed_words
 
@@ -178,3 +179,16 @@ def _torch() -> Any:
     except ImportError:
         return None
     return torch
+
+
+def device_of(name: str) -> Device:
+    """Return the device of a name: "host", "cuda", or "cuda:1" for the second GPU."""
+    kind, _, number = name.partition(":")
+    if name == "host":
+        return HostDevice()
+    if kind == "cuda" and (number.isdigit() or name == "cuda"):
+        return CudaDevice(int(number or 0))
+    raise ValueError(
+        f"device = {name!r} is not known; choose 'cpu', 'cuda', 'cuda:1' (the second GPU), or "
+        "'host' (the kernels of the GPU on the processor, for tests)"
+    )
