@@ -1,4 +1,4 @@
-"""What batches on any device have in common: spaces, seeds of rows, and masks of resets."""
+"""Common base of batches on any device: spaces, seeds of rows, masks of resets."""
 
 from typing import Any
 
