@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from agents.policies import policy_file as files
 from pam_envs.parameters import Signal, Signals
-from pam_envs.wording import shown
+from pam_envs.wording import printable, shown
 
 FIELDS = tuple(field.name for field in dataclasses.fields(Signal))
 
@@ -189,7 +189,9 @@ def _session(data: bytes, name: str) -> onnxruntime.InferenceSession:
     try:
         return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except Exception as error:
-        raise files.PolicyFileError(f"{name} is no executable graph: {error}") from error
+        raise files.PolicyFileError(
+            f"{name} is no executable graph: {printable(str(error))}"
+        ) from error
 
 
 def _signals(described: Any, name: str) -> Signals:
