@@ -190,8 +190,8 @@ def _check_sizes(model: onnx.ModelProto) -> None:
             raise PolicyFileError(f"its shapes do not fit together: {shown(output.name)}")
 
 
-def _inferred(model: onnx.ModelProto, rows: int | None = None) -> dict[str, list[int] | None]:
-    """Return the shape of each value, with 0 for an unknown axis, for a number of rows."""
+def _inferred(model: onnx.ModelProto, rows: int = 0) -> dict[str, list[int] | None]:
+    """Return the shape of each value, with 0 for an unknown axis, for a number of rows if given."""
     bare = onnx.ModelProto()
     bare.CopyFrom(model)
     del bare.graph.value_info[:]

@@ -316,6 +316,17 @@ def test_graphs_beyond_plain_arithmetic_are_refused(model, message, tmp_path, pp
         OnnxPolicy.load(tmp_path / "p.onnx")
 
 
+@pytest.mark.parametrize(
+    "text", [{"unit": '*/ int x = system("id"); /*'}, {"name": 'x"'}, {"unit": "N\n"}, {"name": 3}]
+)
+def test_signals_that_would_change_exported_source_code_are_refused(text, ppo):
+    policy = OnnxPolicy.load(ppo[1] / "policy.onnx")
+    first, *rest = policy.card["signals"]
+    card = {**policy.card, "signals": [{**first, **text}, *rest]}
+    with pytest.raises(PolicyFileError, match="describes no signals"):
+        OnnxPolicy(policy.data, card)
+
+
 def test_large_empty_and_cardless_files_are_refused(tmp_path, ppo):
     file = tmp_path / "p.onnx"
     file.write_bytes(b"\x08" * (MOST_BYTES + 1))
