@@ -18,7 +18,7 @@ from agents.policies import policy_file as files
 from pam_envs.parameters import Signal, Signals
 from pam_envs.wording import printable, shown
 
-NAME, UNIT = re.compile(r"\w{1,100}", re.ASCII), re.compile(r"[\w .^/%°-]{1,20}")
+NAME, UNIT = re.compile(r"[\w .-]{1,100}", re.ASCII), re.compile(r"[\w .^/%°-]{1,20}")
 """Names and units of signals, which an export writes into source code."""
 FIELDS = tuple(field.name for field in dataclasses.fields(Signal))
 
