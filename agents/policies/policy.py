@@ -6,6 +6,7 @@ Inference needs neither torch nor stable-baselines3, and loading a file cannot r
 import dataclasses
 import hashlib
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 
 from agents.policies import policy_file as files
 from pam_envs.parameters import Signal, Signals
-from pam_envs.wording import shown
+from pam_envs.wording import printable, shown
 
+NAME, UNIT = re.compile(r"[\w .-]{1,100}", re.ASCII), re.compile(r"[\w .^/%°-]{1,20}")
+"""Names and units of signals, which an export writes into source code."""
 FIELDS = tuple(field.name for field in dataclasses.fields(Signal))
 
 
@@ -189,7 +192,9 @@ def _session(data: bytes, name: str) -> onnxruntime.InferenceSession:
     try:
         return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except Exception as error:
-        raise files.PolicyFileError(f"{name} is no executable graph: {error}") from error
+        raise files.PolicyFileError(
+            f"{name} is no executable graph: {printable(str(error))}"
+        ) from error
 
 
 def _signals(described: Any, name: str) -> Signals:
@@ -197,7 +202,7 @@ def _signals(described: Any, name: str) -> Signals:
         made = Signals(Signal(**entry) for entry in described)
         for signal in made:
             numbers = np.array([signal.low, signal.high, signal.ahead])
-            text = isinstance(signal.name, str) and isinstance(signal.unit, str)
+            text = NAME.fullmatch(signal.name) and UNIT.fullmatch(signal.unit)
             if not text or numbers.dtype.kind not in "iuf" or not np.isfinite(numbers).all():
                 raise ValueError(f"signal {shown(signal.name)}")
         return made

@@ -16,7 +16,7 @@ import onnx
 import onnx.shape_inference
 
 from pam_envs.files import write_bytes
-from pam_envs.wording import shown
+from pam_envs.wording import printable, shown
 
 POLICY, RECORD = "policy.onnx", "policy.json"  # files of a finished run
 MOST_BYTES = 5_000_000
@@ -72,7 +72,7 @@ def read(path: str | Path) -> PolicyFile:
         check_graph(model)
         return PolicyFile(data, _card(model))
     except PolicyFileError as error:
-        raise PolicyFileError(f"{path.name}: {error}") from error
+        raise PolicyFileError(f"{path.name}: {printable(str(error))}") from error
 
 
 def write_policy(path: Path, data: bytes, record: Mapping[str, Any]) -> None:
@@ -159,39 +159,57 @@ def _check_tensors(tensors: Any) -> None:
 def _check_sizes(model: onnx.ModelProto) -> None:
     """Refuse values of unknown or large size, apart from the batch axis.
 
-    Sizes that the file declares of its own values are not believed.
+    Sizes that the file declares of its own values are not believed. An axis that stays unknown is
+    a multiple of the number of rows, which those of a single row bound.
     """
-    bare = onnx.ModelProto()
-    bare.CopyFrom(model)
-    del bare.graph.value_info[:]
-    for output in bare.graph.output:
-        output.type.tensor_type.ClearField("shape")
-    try:
-        inferred = onnx.shape_inference.infer_shapes(bare, check_type=True, strict_mode=True)
-    except Exception as error:
-        raise PolicyFileError(f"its shapes do not fit together: {error}") from error
-    known = {v.name: v for v in [*inferred.graph.value_info, *inferred.graph.output]}
+    known = _inferred(model)
+    single = _inferred(model, rows=1)
     total = 0
     for node in model.graph.node:
         for name in filter(None, node.output):
-            kind = known[name].type.tensor_type if name in known else None
-            dims = kind.shape.dim if kind is not None and kind.HasField("shape") else None
-            sizes = [d.dim_value for d in dims or () if d.HasField("dim_value")]
-            total += math.prod(sizes)
-            large = math.prod(sizes) > MOST_NUMBERS or total > MOST_IN_ALL
-            if dims is None or len(dims) - len(sizes) > 1 or large:
+            dims, one = known.get(name), single.get(name)
+            numbers = None if one is None or 0 in one else math.prod(one)
+            total += numbers or 0
+            if (
+                dims is None
+                or dims.count(0) > 1
+                or numbers is None
+                or numbers > MOST_NUMBERS
+                or total > MOST_IN_ALL
+            ):
                 raise PolicyFileError(
                     f"the size of {shown(name)} (operator {node.op_type}) is not known in advance "
                     f"or above {MOST_NUMBERS:,} numbers per row, or all values together have more "
                     f"than {MOST_IN_ALL:,}; export a plain feed-forward network"
                 )
     for output in model.graph.output:
-        declared = output.type.tensor_type.shape.dim
-        found = known[output.name].type.tensor_type.shape.dim
+        declared = [d.dim_value for d in output.type.tensor_type.shape.dim]
+        found = known[output.name] or []
         pairs = zip(declared, found, strict=False)
-        fits = all(a.dim_value == b.dim_value for a, b in pairs if a.dim_value and b.dim_value)
-        if len(declared) != len(found) or not fits:
+        if len(declared) != len(found) or not all(a == b for a, b in pairs if a and b):
             raise PolicyFileError(f"its shapes do not fit together: {shown(output.name)}")
+
+
+def _inferred(model: onnx.ModelProto, rows: int = 0) -> dict[str, list[int] | None]:
+    """Return the shape of each value, with 0 for an unknown axis, for a number of rows if given."""
+    bare = onnx.ModelProto()
+    bare.CopyFrom(model)
+    del bare.graph.value_info[:]
+    for output in bare.graph.output:
+        output.type.tensor_type.ClearField("shape")
+    for given in bare.graph.input if rows else ():
+        for first in given.type.tensor_type.shape.dim[:1]:
+            first.dim_value = rows
+    try:
+        inferred = onnx.shape_inference.infer_shapes(bare, check_type=True, strict_mode=True)
+    except Exception as error:
+        raise PolicyFileError(f"its shapes do not fit together: {error}") from error
+    found = {}
+    for value in [*inferred.graph.value_info, *inferred.graph.output]:
+        kind = value.type.tensor_type
+        dims = [d.dim_value for d in kind.shape.dim]
+        found[value.name] = dims if kind.HasField("shape") else None
+    return found
 
 
 def _card(model: onnx.ModelProto) -> dict[str, Any]:

@@ -21,6 +21,7 @@ import importlib
 import importlib.util
 import os
 import pkgutil
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -31,9 +32,11 @@ from baselines.core.controller import Controller
 from baselines.core.entry import AS_DESIGNED, Entry, Knobs, Spec, check_knobs
 from pam_envs import entry_points
 from pam_envs.parameters import Signals
-from pam_envs.wording import near
+from pam_envs.wording import near, shown
 
 VARIABLE = "PAM_ENVS_CONTROLLERS"
+NAME = re.compile(r"[A-Za-z0-9_]{1,100}")
+"""Names of controllers, which are also names of files."""
 PUBLISHED: dict[str, Entry] = {}
 """Controllers tuned by rule or as published."""
 CONTROLLERS: dict[str, Entry] = {}
@@ -46,8 +49,12 @@ def register(name: str, entry: Entry) -> None:
     Raises
     ------
     ValueError
-        If the name is taken.
+        If the name is taken, or has other characters than letters, digits and underscores.
     """
+    if not NAME.fullmatch(name):
+        raise ValueError(
+            f"controller {shown(name)}: a name has at most 100 letters, digits and underscores"
+        )
     if name in CONTROLLERS:
         raise ValueError(f"a controller named {name!r} is registered already; choose another name")
     PUBLISHED[name] = CONTROLLERS[name] = entry

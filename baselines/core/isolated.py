@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from baselines.core import confinement
 from baselines.core.entry import Entry, Spec
 from pam_envs.kernels import cache
+from pam_envs.wording import printable
 
 MOST = 2**26  # bytes of an answer
 LONGEST = 1000  # characters of a message
@@ -35,9 +36,15 @@ NUMBERS = re.compile(r"[<|][biuf](1|2|4|8|16)")
 SERVER = f"{__name__}_server"
 LIBRARIES = (
     *("/usr/lib", "/usr/lib64", "/usr/local/lib", "/usr/share", "/usr/bin", "/lib", "/lib64"),
-    *("/bin", "/etc", "/proc", "/sys", "/dev"),
+    *("/bin", "/etc", "/sys", "/proc/self", "/proc/cpuinfo", "/proc/meminfo", "/proc/stat"),
+    *("/dev/zero", "/dev/full", "/dev/random", "/dev/urandom"),
 )
-"""Folders of the system that interpreter and libraries read."""
+"""What interpreter and libraries read of the system: no devices, and no other processes."""
+VARIABLES = re.compile(
+    r"PATH|HOME|TZ|LANG|LC_\w+|LD_LIBRARY_PATH|XDG_CACHE_HOME|(PYTHON|PAM_ENVS_|NUMBA_)\w+"
+    r"|\w+_(NUM_THREADS|CORETYPE)|MKL_\w+"
+)
+"""Environment variables that a controller sees; others may hold passwords."""
 PACKAGES = ("pam_envs", "sweeps", "baselines", "agents")
 SHOWN = (
     *("summary", "knowledge", "preview", "feedback", "citation", "envs", "seeded", "kind"),
@@ -84,7 +91,8 @@ class Process:
         given = {"module": SERVER, "path": path, **_readable(folder, path)}
         self._child = subprocess.Popen(
             [sys.executable, "-P", confinement.__file__, json.dumps(given)],
-            env={**os.environ, "PAM_ENVS_CONTROLLERS": ""},
+            env={k: v for k, v in os.environ.items() if VARIABLES.fullmatch(k)}
+            | {"PAM_ENVS_CONTROLLERS": ""},
             cwd=folder,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -93,8 +101,8 @@ class Process:
         self._end = weakref.finalize(self, _end, self._child)
         if not self.ask("load", str(folder), whole=True)[0].get("confined"):
             warnings.warn(
-                f"this system has no Landlock: controllers of {folder} have a process of their "
-                "own, which may read and write the files of this user",
+                f"this system has no Landlock or seccomp: controllers of {folder} have a process "
+                "of their own, which may read and write the files of this user",
                 stacklevel=2,
             )
 
@@ -123,7 +131,7 @@ class Process:
                 f"the controller's process gives no answer: {type(error).__name__}"
             ) from error
         if "error" in said:
-            kind, text = str(said["error"]), str(said["message"])[:LONGEST]
+            kind, text = str(said["error"]), printable(str(said["message"])[:LONGEST])
             kind = kind if kind.isidentifier() and len(kind) < 100 else "Exception"
             raise type(kind, (ControllerError,), {})(text)
         return said, arrays
@@ -134,24 +142,37 @@ def entries(folder: str | Path) -> dict[str, Entry]:
     place, found = str(Path(folder).resolve()), {}
     try:
         said, _ = Process(place).ask("list")
-    except (ControllerError, OSError) as error:
+        for name, about in said["entries"].items():
+            made = partial(IsolatedController, place, str(name))
+            found[str(name)] = Entry(make=made, **_described(about))
+    except (ControllerError, OSError, LookupError, TypeError, AttributeError) as error:
         raise ValueError(f"controllers of {folder}: {type(error).__name__}: {error}") from error
-    for name, about in said["entries"].items():
-        known = {key: about[key] for key in SHOWN}
-        known["envs"] = tuple(known["envs"])
-        known["knobs"] = {key: (low, high) for key, (low, high) in known["knobs"].items()}
-        found[str(name)] = Entry(make=partial(IsolatedController, place, str(name)), **known)
     return found
+
+
+def _described(about: Any) -> dict[str, Any]:
+    """Return the description of an entry, with printable texts."""
+    known = {key: about[key] for key in SHOWN}
+    known = {key: printable(v) if isinstance(v, str) else v for key, v in known.items()}
+    known["envs"] = tuple(known["envs"])
+    known["knobs"] = {key: (low, high) for key, (low, high) in known["knobs"].items()}
+    return known
 
 
 def _readable(folder: str, paths: list[str]) -> dict[str, list[str]]:
     """Return what a controller's process may read: libraries, the package, and the folder."""
     found = [importlib.util.find_spec(name) for name in PACKAGES]
     packages = [place for one in found if one for place in one.submodule_search_locations or ()]
-    checkouts = [path for path in paths if os.path.exists(os.path.join(path, "benchmarks"))]
+    home = str(Path.home())
+    listed = [
+        path
+        for path in paths
+        if os.path.exists(os.path.join(path, "benchmarks"))
+        or os.path.commonpath([path, home]) == path  # of a script in the home folder
+    ]
     files = [*LIBRARIES, sys.prefix, sys.base_prefix, str(cache.FOLDER), *packages, folder]
-    files += [path for path in paths if path not in checkouts]
-    return {"files": files, "folders": checkouts}
+    files += [path for path in paths if path not in listed]
+    return {"files": files, "folders": listed}
 
 
 def _end(child: Any) -> None:

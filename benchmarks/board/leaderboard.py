@@ -1,6 +1,7 @@
 """The board's files: a pure function of the rows, with equal bytes for equal rows."""
 
 import html
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ from benchmarks.runs.store import write_folder
 from pam_envs.files import write_text
 
 BOARD = Path(__file__).parents[1] / "LEADERBOARD.md"
+MARKUP = re.compile(r"([\\`\[\]])")
+"""Characters that begin links, images and code in Markdown."""
 PAGES = "leaderboard"  # folder of the pages beside the board, with the figures and the times
 
 
@@ -54,7 +57,7 @@ def files(all_rows: Sequence[Row]) -> dict[str, str]:
 def _escaped(value: Any) -> Any:
     """Return nested values with every text as plain text of Markdown, without HTML."""
     if isinstance(value, str):
-        return html.escape(value, quote=False)
+        return MARKUP.sub(r"\\\1", html.escape(value, quote=False))
     if isinstance(value, dict):
         return {key: _escaped(entry) for key, entry in value.items()}
     return [_escaped(entry) for entry in value] if isinstance(value, list) else value

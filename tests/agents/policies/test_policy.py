@@ -269,9 +269,31 @@ def long(kind: str, number: int, wide: bool) -> Any:
     return graph([*first, *rest], [big] if wide else [])
 
 
+def growing(kind: str) -> Any:
+    """Return a graph whose batch axis grows: by doubling, or by a wide value laid out as rows."""
+    if kind == "Concat":
+        names = ["observation", *(f"v{i}" for i in range(30))]
+        nodes = [node("Concat", f"{a} {a}", b, axis=0) for a, b in itertools.pairwise(names)]
+        return graph([*nodes, node("MatMul", f"{names[-1]} w")], [weights()])
+    wide = helper.make_tensor("b", TensorProto.FLOAT, (10, 50_000), bytes(2_000_000), raw=True)
+    long = helper.make_tensor("c", TensorProto.FLOAT, (1, 50_000), bytes(200_000), raw=True)
+    shape = helper.make_tensor("shape", TensorProto.INT64, (2,), [-1, 1])
+    nodes = [
+        node("MatMul", "observation b", "wide"),
+        node("Reshape", "wide shape", "rows"),
+        node("MatMul", "rows c", "huge"),
+        node("Transpose", "huge", "action"),
+    ]
+    return graph(nodes, [wide, long, shape])
+
+
 @pytest.mark.parametrize(
     ("model", "message"),
     [
+        (growing("Concat"), "not known in advance"),
+        (growing("Reshape"), "not known in advance"),
+        (graph([node("Op\x1b[2J")]), r"operator Op\\x1b\[2J;"),
+        (graph([node("Op", domain="\x1b[2J")], domains=("", "\x1b[2J")), r"of \\x1b\[2J;"),
         (undeclared("Reshape"), "not known in advance|do not fit"),
         (undeclared("MatMul"), "not known in advance|do not fit"),
         (long("Tanh", 501, False), "has 501 operators"),
@@ -292,6 +314,17 @@ def test_graphs_beyond_plain_arithmetic_are_refused(model, message, tmp_path, pp
     (tmp_path / "p.onnx").write_bytes(model.SerializeToString())
     with pytest.raises(PolicyFileError, match=message):
         OnnxPolicy.load(tmp_path / "p.onnx")
+
+
+@pytest.mark.parametrize(
+    "text", [{"unit": '*/ int x = system("id"); /*'}, {"name": 'x"'}, {"unit": "N\n"}, {"name": 3}]
+)
+def test_signals_that_would_change_exported_source_code_are_refused(text, ppo):
+    policy = OnnxPolicy.load(ppo[1] / "policy.onnx")
+    first, *rest = policy.card["signals"]
+    card = {**policy.card, "signals": [{**first, **text}, *rest]}
+    with pytest.raises(PolicyFileError, match="describes no signals"):
+        OnnxPolicy(policy.data, card)
 
 
 def test_large_empty_and_cardless_files_are_refused(tmp_path, ppo):

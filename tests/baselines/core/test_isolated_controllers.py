@@ -8,9 +8,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from baselines.core import isolated
+from baselines.core import catalogue, isolated
 from baselines.core.catalogue import CONTROLLERS, PUBLISHED
 from benchmarks.runs import cells, controllers
 from benchmarks.runs.controllers import ROOT
@@ -24,7 +25,7 @@ from baselines.core.catalogue import PUBLISHED
 ENTRIES = {f"again_{name}": replace(PUBLISHED[name], author="Another") for name in (%r,)}
 """
 EVIL = """
-import ctypes, os, signal, socket, subprocess
+import ctypes, os, resource, socket, subprocess
 from pathlib import Path
 
 import numpy as np
@@ -37,13 +38,26 @@ ROOT = Path(%r)
 def outcome(act):
     try:
         return str(act() or "done")
+    except PermissionError:
+        return "denied"
     except BaseException as error:
         return type(error).__name__
 
 
-def listened():
-    with socket.socket() as server:
-        server.bind(("127.0.0.1", 0))
+def forked():
+    if os.fork() == 0:
+        os._exit(0)
+
+
+def connected(family, kind):
+    with socket.socket(family, kind):
+        return "opened"
+
+
+def shared():
+    number = ctypes.CDLL(None, use_errno=True).shmget(0, ctypes.c_size_t(4096), 0o1600)
+    if number < 0:
+        raise OSError(ctypes.get_errno(), "shmget")
 
 
 ATTEMPTS = {
@@ -53,12 +67,23 @@ ATTEMPTS = {
     "metrics": lambda: __import__("benchmarks.scoring.metrics"),
     "rewriting": lambda: (ROOT / "baselines/core/entry.py").open("a"),
     "writing": lambda: (Path(__file__).parent / "more.txt").write_text("x"),
+    "permissions": lambda: os.chmod(__file__, 0o600),
+    "times": lambda: os.utime(__file__, (1, 1)),
     "memory": lambda: open(f"/proc/{os.getppid()}/mem", "rb"),
+    "environment": lambda: open(f"/proc/{os.getppid()}/environ", "rb"),
+    "password": lambda: os.environ["A_PASSWORD"],
     "signal": lambda: os.kill(os.getppid(), 0),
-    "network": listened,
+    "priority": lambda: os.setpriority(os.PRIO_PROCESS, os.getppid(), 19),
+    "limit": lambda: resource.prlimit(os.getppid(), resource.RLIMIT_NOFILE),
+    "shared": shared,
+    "network": lambda: connected(socket.AF_INET, socket.SOCK_STREAM),
+    "datagram": lambda: connected(socket.AF_INET, socket.SOCK_DGRAM),
+    "bus": lambda: connected(socket.AF_UNIX, socket.SOCK_STREAM),
+    "terminal": lambda: open("/dev/tty"),
     "child": lambda: subprocess.run(
         ["cat", str(ROOT / "benchmarks/rounds.json")], check=True, capture_output=True
     ),
+    "fork": forked,
 }
 
 
@@ -138,6 +163,7 @@ def test_isolated_run_equals_the_run_in_this_process_bit_for_bit(
 
 @pytest.fixture
 def evil(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("A_PASSWORD", "secret")
     entries(tmp_path, EVIL % str(ROOT), monkeypatch)
     return tmp_path
 
@@ -149,20 +175,16 @@ def played(name: str) -> dict[str, Any]:
     return episode
 
 
-REFUSALS = "PermissionError|ModuleNotFoundError|CalledProcessError"
-REACHED = {
-    "salts": ("salts", "history", "child", "network"),
-    "scoring": ("metrics", "rewriting", "writing", "memory", "signal"),
-}
-
-
-@pytest.mark.skipif(not confined(), reason="no Landlock")
-@pytest.mark.parametrize("what", REACHED)
-def test_confined_controller_reaches_no(what: str, evil: Path) -> None:
-    said = played("evil")["failure"]
-    assert said.startswith("ValueError: ")
-    for name in REACHED[what]:
-        assert re.search(rf"\b{name}=({REFUSALS})", said), (name, said)
+@pytest.mark.skipif(not confined(), reason="no Landlock or seccomp")
+def test_confined_controller_reaches_nothing(evil: Path) -> None:
+    process = isolated.Process(str(evil))
+    process.ask("make", "evil", None, None, None, {}, 0)
+    with pytest.raises(isolated.ControllerError) as raised:
+        process.ask("predict", np.zeros(1), True, None, True)
+    said = dict(re.findall(r"(\w+)=(\w+)", str(raised.value)))
+    assert len(said) == 20
+    assert said.pop("metrics") in ("denied", "ModuleNotFoundError")
+    assert said == dict.fromkeys(said, "denied") | {"password": "KeyError"}
     assert [path.name for path in evil.iterdir()] == ["theirs.py"]
 
 
@@ -204,7 +226,27 @@ def test_folder_of_the_variable_is_not_imported_in_this_process(evil: Path) -> N
     assert done.stdout == "False Another\n"
 
 
-def test_error_in_a_folder_is_one_sentence(tmp_path: Path) -> None:
-    (tmp_path / "theirs.py").write_text("1/0")
-    with pytest.raises(ValueError, match=r"controllers of .*: ZeroDivisionError: division by zero"):
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1/0", "ZeroDivisionError: division by zero"),
+        ("raise ValueError('\\x1b[2J')", r"ValueError: \\x1b\[2J"),
+        ((AGAIN % "pid").replace("again_", "../"), "a name has at most"),
+        (
+            "from baselines.core import isolated_server\n"
+            "isolated_server.Server.list = lambda self: ({'entries': {'x': {}}}, [])\n"
+            + AGAIN
+            % "pid",
+            "KeyError",
+        ),
+    ],
+)
+def test_error_in_a_folder_is_one_sentence(text: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "theirs.py").write_text(text)
+    with pytest.raises(ValueError, match=rf"controllers of .*{message}"):
         isolated.entries(tmp_path)
+
+
+def test_name_of_a_controller_is_no_path() -> None:
+    with pytest.raises(ValueError, match="a name has at most 100 letters"):
+        catalogue.register("../rows", CONTROLLERS["pid"])

@@ -232,14 +232,15 @@ def test_message_names_the_row_with_an_unknown_citation_or_a_repeated_episode():
             leaderboard.files([row])
 
 
-def test_text_of_a_row_is_no_html(monkeypatch):
+def test_text_of_a_row_is_no_html_link_or_code(monkeypatch):
     row = fakes.row("pid", 1e-3)
-    evil = '<img src=x onerror="alert(1)">'
+    evil = '<img src=x onerror="alert(1)"> ![](http://x) `{download}`'
     row["volatile"]["machine"] = row["controller"]["author"] = row["controller"]["summary"] = evil
     row["controller"]["tuning"]["how"] = row["scenarios"]["content"]["title"] = evil
     texts = leaderboard.files([row])
     assert "&lt;img src=x" in texts["leaderboard/times.md"]
-    assert not any("<img src=x" in text for name, text in texts.items() if name.endswith(".md"))
+    pages = [text for name, text in texts.items() if name.endswith(".md")]
+    assert not any(part in page for page in pages for part in ("<img src=x", "![]", " `{"))
 
 
 def test_board_of_another_folder_writes_nothing_outside_of_it(tmp_path, monkeypatch):
