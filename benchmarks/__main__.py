@@ -356,7 +356,7 @@ def speed(only: tuple[str, ...] = (), rounds: int = 7, json: Path | None = None)
 
     Args:
         only: Groups to measure: single, batch, air, planning, controllers, plain, start, learning,
-            diagnosis. All by default.
+            diagnosis, gpu. All by default.
         rounds: Number of interleaved rounds; the median counts.
         json: Also write the figures to this file.
     """

@@ -20,7 +20,7 @@ from pam_envs.wording import package
 
 ENVIRONMENT = "PAM/MusclePositioning-v0"
 CORE = ("numpy", "scipy", "numba", "llvmlite", "gymnasium")
-USER_EXTRAS = ("plot", "data", "formats", "baselines", "agents", "export", "rig")
+USER_EXTRAS = ("plot", "data", "formats", "baselines", "agents", "export", "rig", "cuda")
 REQUIREMENT = re.compile(r"([\w.-]+)[^;]*;.*extra == ['\"](\w+)['\"]")
 STEPS = 5  # compared between plain Python and machine code
 
@@ -112,6 +112,21 @@ def gpu() -> Iterator[Finding]:
         yield Finding("GPU", f"torch {torch.__version__} finds none; training runs on the CPU")
 
 
+def batches() -> Iterator[Finding]:
+    """Yield the GPU that cuda-core finds for ``gym.make_vec(..., device="cuda")``."""
+    version = _version("cuda-core")
+    if not version:
+        text = "cuda-core is not installed (pip install 'pam-envs[cuda]'); batches run on the CPU"
+        yield Finding("GPU batches", text)
+        return
+    from pam_envs.envs.device.cuda import CudaDevice
+
+    try:
+        yield Finding("GPU batches", f"cuda-core {version}, {CudaDevice().model}")
+    except (RuntimeError, gym.error.DependencyNotInstalled) as error:
+        yield Finding("GPU batches", f"cuda-core {version}: {error}")
+
+
 CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (
     versions,
     extras,
@@ -119,6 +134,7 @@ CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (
     stored,
     first_step,
     gpu,
+    batches,
 )
 
 

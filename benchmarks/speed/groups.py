@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from benchmarks.speed import probes
 from benchmarks.speed.controllers import controllers
 from benchmarks.speed.diagnosis import diagnosing
+from benchmarks.speed.gpu import gpu
 from benchmarks.speed.learning import learning, shares
 from benchmarks.speed.rates import Measurement, Missing
 
@@ -22,6 +23,7 @@ GROUPS: dict[str, tuple[Probe, ...]] = {
     "start": (probes.start_up,),
     "learning": (learning, shares),
     "diagnosis": (diagnosing,),
+    "gpu": (gpu,),
 }
 
 

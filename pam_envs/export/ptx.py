@@ -5,58 +5,13 @@ import json
 import shutil
 import subprocess
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pam_envs.envs.core.lanes import restart_lane, step_lane
+from pam_envs.envs.core.lanes import ARCHITECTURE, PARTS, LaneKernel
 from pam_envs.export.model import Model
-from pam_envs.kernels.emission import Target, emit
-from pam_envs.kernels.intermediate import ENTRY
-from pam_envs.kernels.machine_code import AddressKernel, intermediate_of
-
-ARCHITECTURE = "sm_80"
-"""Oldest architecture for which the code is emitted; drivers compile it for newer ones."""
-PARTS = {"step": step_lane, "restart": restart_lane}
-_GRID = """
-declare i32 @llvm.nvvm.read.ptx.sreg.ctaid.x()
-declare i32 @llvm.nvvm.read.ptx.sreg.ntid.x()
-declare i32 @llvm.nvvm.read.ptx.sreg.tid.x()
-define ptx_kernel void @{name}(ptr %book, i64 %number) {{
-  %block = call i32 @llvm.nvvm.read.ptx.sreg.ctaid.x()
-  %size = call i32 @llvm.nvvm.read.ptx.sreg.ntid.x()
-  %thread = call i32 @llvm.nvvm.read.ptx.sreg.tid.x()
-  %wide_block = zext i32 %block to i64
-  %wide_size = zext i32 %size to i64
-  %wide_thread = zext i32 %thread to i64
-  %first = mul i64 %wide_block, %wide_size
-  %lane = add i64 %first, %wide_thread
-  %inside = icmp slt i64 %lane, %number
-  br i1 %inside, label %run, label %done
-run:
-  call void @{entry}(ptr %book, i64 %lane)
-  br label %done
-done:
-  ret void
-}}
-"""
-
-
-@dataclass(frozen=True)
-class LaneKernel:
-    """Kernel of one environment of a batch in the layout (rows, N)."""
-
-    kernels: Any
-    part: str
-
-    @property
-    def by_address(self) -> AddressKernel:
-        """The kernel that takes an address book and a lane."""
-        single = self.kernels.by_address
-        name = f"{self.part}_lane_{single.name.removeprefix('single_')}"
-        return AddressKernel(name, PARTS[self.part], single.names, single.words)
 
 
 def ptx_of(model: Model, part: str, architecture: str = ARCHITECTURE) -> str:
@@ -66,11 +21,8 @@ def ptx_of(model: Model, part: str, architecture: str = ARCHITECTURE) -> str:
             "PTX is for environments, not for plants: give the id of an environment, or export "
             "the plant as C"
         )
-    text = intermediate_of(LaneKernel(model.kernels["kernel"], part))
-    text = text.replace(f"define void @{ENTRY}(", f"define internal void @{ENTRY}(")
-    text += _GRID.format(name=f"{model.prefix}_{part}", entry=ENTRY)
-    target = Target("nvptx64-nvidia-cuda", architecture)
-    return emit(text, target, assembly=True).decode()
+    kernel = LaneKernel(model.kernels["kernel"], part)
+    return kernel.ptx(f"{model.prefix}_{part}", architecture).decode()
 
 
 def export_ptx(model: Model, folder: Path, architecture: str = ARCHITECTURE) -> None:
@@ -105,7 +57,7 @@ def layout(model: Model) -> dict[str, Any]:
         "action": ["N", len(model.inputs)],
         "observation": [1, "N", model.block("observation").values.shape[2]],
         "report": [1, model.block("report").values.shape[1], "N"],
-        "flags": [2, "N"],
+        "flags": [3, "N"],
     }
     found = []
     for block in model.blocks:

@@ -17,13 +17,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from pam_envs.kernels import shipped
 from pam_envs.kernels.build import INTRINSICS
 from pam_envs.kernels.cache import FOLDER, complain, read_whole, write_whole
 from pam_envs.kernels.notice import Notice, announce
 from pam_envs.kernels.rebind import graph_digest
+
+if TYPE_CHECKING:
+    from pam_envs.kernels.emission import Target
 
 Run = Callable[[int, int], None]
 """Takes the address of an address book, and a mode."""
@@ -244,3 +247,20 @@ def intermediate_of(source: Source) -> str:
             )
         time.sleep(0.2)
     return lzma.decompress(packed).decode()
+
+
+def emitted(text: str, target: "Target", assembly: bool = False) -> bytes:
+    """Return the code of LLVM IR for a target (see ``emission.emit``), from the cache if kept."""
+    from pam_envs.kernels import emission
+
+    tool = Path(emission.__file__).read_text(encoding="utf-8")
+    key = hashlib.sha256("\n".join((repr(target), str(assembly), tool, text)).encode()).hexdigest()
+    file = FOLDER / f"emitted_{key[:24]}.{'s' if assembly else 'o'}"
+    data = read_whole(file)
+    if data is None:
+        data = emission.emit(text, target, assembly)
+        try:
+            write_whole(file, data)
+        except OSError:
+            complain(FOLDER, "cannot be written")
+    return data

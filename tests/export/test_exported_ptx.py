@@ -80,12 +80,19 @@ def test_lanes_side_by_side_have_the_bits_of_single_environments() -> None:
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_ptx_has_one_kernel_without_fused_arithmetic(small, part: str) -> None:
+def test_ptx_has_one_kernel_that_calls_nothing(small, part: str) -> None:
     text = ptx_of(small.model, part)
     assert re.findall(r"\.visible \.entry (\w+)", text) == [f"{small.model.prefix}_{part}"]
-    assert "fma." not in text
-    assert "mul.rn.f64" in text
     assert not re.search(r"\.extern \.func", text)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_ptx_rounds_every_operation_to_nearest(small, part: str) -> None:
+    text = ptx_of(small.model, part)
+    operation = r"^\s*((?:add|sub|mul|div|rcp|sqrt|fma|mad|ex2|lg2|sin|cos)\.\S*f(?:16|32|64))\b"
+    found = set(re.findall(operation, text, re.MULTILINE))
+    assert {"add.rn.f64", "mul.rn.f64", "div.rn.f64"} <= found
+    assert found <= {f"{name}.rn.f64" for name in ("add", "sub", "mul", "div", "rcp", "sqrt")}
 
 
 @pytest.mark.skipif(find_ptxas() is None, reason="ptxas is not installed")

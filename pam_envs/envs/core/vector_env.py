@@ -5,10 +5,10 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from pam_envs.envs.core.batch import Batch
 from pam_envs.envs.core.saved_state import (
     check_limits,
     check_seal,
@@ -21,14 +21,9 @@ from pam_envs.envs.core.setup import (
     BEGIN,
     STEP,
     STEP_AND_RESTART,
-    Configured,
     Setup,
     check_choice,
-    check_seed,
-    check_whole,
     for_kernels,
-    fresh_seed,
-    space_of,
     tiles_for,
 )
 from pam_envs.kernels.build import COMPILED, LANES
@@ -41,7 +36,7 @@ _THREADS_OF: list[int] = []
 """Process whose threads run parallel kernels; they do not exist in its forks."""
 
 
-class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
+class PlantVectorEnv(Batch):
     """``num_envs`` environments stepped by one kernel call.
 
     Row ``i`` of a batch reset with seed ``s`` is the single environment reset with ``s + i``, bit
@@ -61,15 +56,22 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         Mode of automatic resets, or its value: "SameStep", "NextStep" or "Disabled".
     setup : Setup, optional
         Configuration; default: ``make_setup(**arguments)``.
+    device : str
+        "cpu". For others :class:`~pam_envs.envs.device.vector_env.DeviceVectorEnv` is made.
     **arguments : object
         Keyword arguments of the environment.
     """
 
-    metadata = {
-        "render_modes": ["rgb_array"],
-        "render_fps": 100,
-        "autoreset_mode": AutoresetMode.SAME_STEP,
-    }
+    def __new__(cls, *given: Any, device: Any = "cpu", **named: Any) -> Any:
+        """Return a batch on the processor, or one on another device."""
+        if device == "cpu":
+            return super().__new__(cls)
+        from pam_envs.envs.device.vector_env import DeviceVectorEnv
+
+        own = ("num_envs", "info", "autoreset_mode", "setup")
+        kept = {name: named.pop(name) for name in own if name in named}
+        kept["setup"] = kept.get("setup") or cls.make_setup(**named)
+        return DeviceVectorEnv(*given, **kept, device=device)
 
     def __init__(
         self,
@@ -78,10 +80,12 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         threads: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         setup: Setup | None = None,
+        *,
+        device: str = "cpu",
         **arguments: Any,
     ) -> None:
         setup = self._configure(setup, arguments)
-        self.num_envs = check_whole("num_envs", num_envs, 1, 2**24)
+        self._configure_batch(num_envs, setup)
         check_choice("a batch's render_mode", setup.render_mode, (None, "rgb_array"))
         if setup.render_mode is not None and not info:
             raise ValueError("render_mode = 'rgb_array' needs info; leave info=True")
@@ -90,11 +94,6 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.with_info = bool(info)
         self._renderers: list[Any] = []
-        self.single_observation_space = space_of(setup.signals)
-        self.single_action_space = space_of(setup.action_signals)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self._seeded = False
         self._ended = np.zeros(self.num_envs, np.bool_)
         self._last_observation = np.zeros((self.num_envs, len(setup.signals)), np.float32)
         self._all = tuple(for_kernels(a) for a in setup.state(tiles_for(num_envs), LANES))
@@ -111,17 +110,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start episodes; see Gymnasium. ``options["reset_mask"]`` resets some rows only."""
-        self._check_options(options, ("reset_mask",))
-        mask = np.ones(self.num_envs, np.bool_)
-        if options is not None and "reset_mask" in options:
-            mask = np.asarray(options["reset_mask"])
-            if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
-                raise ValueError(
-                    f"reset_mask has shape {mask.shape} and type {mask.dtype}, expected "
-                    f"({self.num_envs},) of bool"
-                )
-        if not self._seeded and not mask.all():
-            raise ValueError("the first reset must reset every row; leave reset_mask out")
+        mask = self._mask(options)
         self._seed_rows(self._seeds(seed), mask)
         outputs = self._outputs()
         observations, infos, flags = outputs
@@ -167,24 +156,6 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         self._kernel(*self._all, *self._shared, *arguments)
         for array, view in zip(outputs, views, strict=True):
             array[...] = np.array(view, array.dtype).reshape(array.shape)
-
-    def _seeds(self, seed: Any) -> list[int | None] | None:
-        if seed is None:
-            if self._seeded:
-                return None
-            seed = fresh_seed()
-        if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool):
-            first = check_seed(seed)
-            return [first + i for i in range(self.num_envs)]
-        if not isinstance(seed, (list, tuple)) or len(seed) != self.num_envs:
-            raise ValueError(
-                f"seed = {str(seed)[:60]} must be a non-negative whole number or a list of "
-                f"{self.num_envs} of them"
-            )
-        made: list[int | None] = [None if s is None else check_seed(s) for s in seed]
-        if not self._seeded:
-            return [fresh_seed() if s is None else s for s in made]
-        return made
 
     def step(
         self, actions: NDArray[Any]

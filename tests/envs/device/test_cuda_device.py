@@ -1,0 +1,95 @@
+"""GPU through cuda-core: addresses, copies, launches and arrays, with the driver replaced."""
+
+import sys
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import pam_envs  # noqa: F401  registers the environments
+from pam_envs.envs.core.lanes import LaneKernel
+from pam_envs.envs.device.cuda import CudaArray, CudaDevice
+from pam_envs.kernels.build import COMPILED
+from pam_envs.kernels.emission import host
+from pam_envs.kernels.machine_code import load
+from tests.envs.device import fake_cuda
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="batches on a device are compiled")
+ID = "PAM/MusclePositioning-v0"
+
+
+@pytest.fixture(autouse=True)
+def driver(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replace the driver; a kernel is the loop over environments on the processor."""
+    fake_cuda.install(monkeypatch)
+
+    def compiled(self: CudaDevice, kernel: LaneKernel) -> Any:
+        return load(kernel.object_code(host()))
+
+    monkeypatch.setattr(CudaDevice, "compiled", compiled)
+
+
+@pytest.mark.parametrize("with_torch", [True, False])
+@pytest.mark.parametrize("number", [7, 130])
+def test_batch_through_the_binding_has_the_same_bits(
+    number: int, with_torch: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if with_torch:
+        pytest.importorskip("torch")
+    else:
+        monkeypatch.setitem(sys.modules, "torch", None)
+    ours, theirs = (
+        gym.make_vec(ID, number, device=d, episode_seconds=0.3) for d in ("cuda", "cpu")
+    )
+    assert ours.device.name == "cuda:0"
+    first, expected = ours.reset(seed=4)[0], theirs.reset(seed=4)[0]
+    assert np.array_equal(np.from_dlpack(first), expected)
+    generator = np.random.default_rng(0)
+    for _ in range(40):
+        actions = generator.uniform(-1.0, 1.0, theirs.action_space.shape)
+        *found, info = ours.step(actions)
+        *expected, other = theirs.step(actions)
+        for one, two in zip(found, expected, strict=True):
+            assert np.array_equal(np.from_dlpack(one), two)
+        for key in ours.setup.info_keys:
+            assert np.array_equal(np.from_dlpack(info[key]), other[key])
+
+
+def test_rows_of_an_array_share_its_memory() -> None:
+    device = CudaDevice()
+    values = np.arange(24.0).reshape(2, 3, 4)
+    array = device.upload(values)
+    row = array[1][2]
+    assert np.array_equal(np.from_dlpack(row), values[1, 2])
+    device.write(row, np.full(4, -1.0))
+    assert np.array_equal(device.read(array)[1, 2], np.full(4, -1.0))
+    assert np.array_equal(device.read(array)[0], values[0])
+    with pytest.raises(IndexError, match="row 2 is not among the 2 rows"):
+        array[2]
+
+
+def test_array_interface_names_address_shape_and_type() -> None:
+    array = CudaDevice().upload(np.zeros((2, 5), np.float32))
+    found = array[1].__cuda_array_interface__
+    assert found["data"] == (array.address + 20, False)
+    assert (found["shape"], found["typestr"], found["version"]) == ((5,), "<f4", 3)
+
+
+def test_actions_of_another_library_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    device = CudaDevice()
+    array, given = device.upload(np.zeros((3, 2))), device.upload(np.ones((3, 2)))
+    device.take(array, given)
+    assert np.array_equal(device.read(array), np.ones((3, 2)))
+    with pytest.raises(ValueError, match=r"float32.*expected"):
+        device.take(array, CudaArray(given._buffer, (3, 2), np.float32))
+
+
+def test_missing_gpu_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(number: int) -> Any:
+        raise OSError("the driver's library is missing")
+
+    monkeypatch.setattr(sys.modules["cuda.core"], "Device", fail)
+    with pytest.raises(RuntimeError, match=r"'cuda:1' cannot be used.*missing.*nvidia-smi"):
+        gym.make_vec(ID, 2, device="cuda:1")
