@@ -309,7 +309,7 @@ def papers(
 
 
 def bound(track: Positional[tuple[str, ...]], episodes: int = 4, horizon: int = 60) -> int:
-    """Bound the error of tracks from below: a clairvoyant controller that knows plant and future.
+    """Estimate the smallest error of tracks: a controller that knows plant, state and future.
 
     Args:
         track: Names of scenario files.

@@ -297,7 +297,7 @@ class Recording:
             known |= {c.name: "output" for c in wiring.outputs}
             for kind, names in (("input", inputs), ("output", outputs)):
                 problems += [
-                    f"{name!r} is no {kind} of a {plant}"
+                    f"{name!r} is no {kind} of the plant {plant}"
                     + near(name, [k for k, v in known.items() if v == kind])
                     for name in names
                     if known.get(name) != kind
@@ -425,7 +425,7 @@ def _load_of_plant(path: str | Path, rig: Rig) -> Recording:
     if lacking and not needed:
         needed = [c for c in pressures if c.name not in columns]
     problems += [
-        f"row 1: a recording of a {rig.plant} needs the column {c.column}"
+        f"row 1: a recording of the plant {rig.plant} needs the column {c.column}"
         + ("" if c in lacking else ", or commands: " + ", ".join(k.column for k in commands))
         for c in needed
     ]

@@ -42,7 +42,7 @@ def kind_of(plant: Any, sheet: Rig, declared: bool = True) -> Kind:
     family = getattr(plant, "family", sheet.plant)
     if declared and family != sheet.plant:
         raise ValueError(
-            f"the plant is a {family}, RIG.yaml says plant: {sheet.plant}; give the plant of the "
-            "rig"
+            f"the plant is of family {family}, RIG.yaml says plant: {sheet.plant}; give the plant "
+            "of the rig"
         )
     return kind_named(family)

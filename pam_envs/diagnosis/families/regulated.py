@@ -137,7 +137,7 @@ class RegulatedKind:
     @property
     def loop_reason(self) -> str:
         """Reason why controllers are not compared."""
-        return f"controllers of a {self.name} are not compared"
+        return f"controllers are not compared for the plant {self.name}"
 
     def preset(self) -> Any:
         """Return the default plant."""
@@ -149,7 +149,8 @@ class RegulatedKind:
         for key in sheet.variant:
             if key not in plant.makes:
                 raise ValueError(
-                    f"RIG.yaml: variant.{key} is no choice of a {self.name}{near(key, plant.makes)}"
+                    f"RIG.yaml: variant.{key} is no choice of the plant {self.name}"
+                    + near(key, plant.makes)
                 )
         plant = dataclasses.replace(plant, **sheet.variant)
         sizes = {**self.sizes, "max_pressure": ("regulator.max_pressure",)}

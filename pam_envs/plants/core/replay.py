@@ -20,7 +20,7 @@ def drives_for(plant: Plant, channels: Mapping[str, ArrayLike]) -> Array:
     unknown = set(channels) - set(defaults)
     if unknown:
         raise ValueError(
-            f"{min(unknown)!r} is not an input of a {plant.family}; the inputs are: "
+            f"{min(unknown)!r} is not an input of the plant {plant.family}; the inputs are: "
             + ", ".join(defaults)
         )
     return drives_of([channels.get(name, usual) for name, usual in defaults.items()])

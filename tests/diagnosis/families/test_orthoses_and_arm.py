@@ -147,7 +147,7 @@ def test_variants_that_cannot_be_replayed_are_refused_with_a_remedy():
     kind = kind_named("knee_orthosis")
     with pytest.raises(ValueError, match="record the brace alone"):
         kind.bind(KneeOrthosis.on_leg(), made, Rig())
-    with pytest.raises(ValueError, match=r"variant\.mount is no choice of a knee_orthosis"):
+    with pytest.raises(ValueError, match=r"variant\.mount is no choice of the plant knee_orthosis"):
         kind.start(Rig(plant="knee_orthosis", variant={"mount": "rig"}))
     with pytest.raises(ValueError, match="choose one of rig, no_load, leg"):
         kind.start(Rig(plant="knee_orthosis", variant={"mounting": "wall"}))
