@@ -6,7 +6,9 @@ VERIFY, ROWS, STORE = (f"{RUNS}/test_{name}.py::test_" for name in ("verify", "r
 ENTRY, NOT_A_ROW = f"{VERIFY}forged_entry_is_detected", f"{ROWS}row_that_is_incomplete_or_misnamed"
 ELSEWHERE = f"{VERIFY}forgery_beyond_rounding_is_detected_on_another_machine"
 HOSTILE = f"{STORE}hostile_file_is_one_sentence_with_its_name"
-CONFINED = "tests/baselines/core/test_isolated_controllers.py::test_confined_controller_reaches_no"
+CONFINED = (
+    "tests/baselines/core/test_isolated_controllers.py::test_confined_controller_reaches_nothing"
+)
 
 FORGERIES: tuple[tuple[str, str, str], ...] = (
     ("score lower by 1e-12", REFUSED, f"{ENTRY}[score]"),
@@ -54,6 +56,6 @@ FORGERIES: tuple[tuple[str, str, str], ...] = (
         "tests/benchmarks/identity/test_audit_rounds.py::"
         "test_changed_round_is_found_even_if_it_is_committed",
     ),
-    ("controller that patches the scoring", REFUSED, f"{CONFINED}[scoring]"),
-    ("controller that reads the salts", REFUSED, f"{CONFINED}[salts]"),
+    ("controller that patches the scoring", REFUSED, CONFINED),
+    ("controller that reads the salts", REFUSED, CONFINED),
 )

@@ -198,7 +198,7 @@ class Plant:
 
     def _usage(self) -> Usage:
         """Return the demands on the hysteresis operator."""
-        return Usage(f"a {self.family}", "virgin")
+        return Usage(f"the {self.family}", "virgin")
 
     def _check(self) -> None:
         """Raise if the plant cannot be built or simulated: checks of a single family."""
