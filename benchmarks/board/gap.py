@@ -119,13 +119,12 @@ def gap(paper: Row, row: Row, bounds: Bounds) -> Gap | None:
     columns = statistics.resample_indices(strata, statistics.RESAMPLES, statistics.BOOTSTRAP_SEED)
     means = {name: np.array([v.mean(), *v[columns].mean(axis=1)]) for name, v in tables.items()}
     whole = means["paper"] - means["oracle"]
-    share = np.divide(
-        means["paper"] - means["row"], whole, out=np.full(whole.shape, np.nan), where=whole > 0.0
-    )
     travel = _scores(row, TRAVEL, bounds).mean() / _scores(paper, TRAVEL, bounds).mean()
     errors = {k: statistics.between(float(v[0]), v[1:]) for k, v in means.items()}
-    drawn = np.where(np.isnan(share[1:]), -np.inf, share[1:])
-    closed = statistics.between(float(share[0]), drawn)
+    closed = statistics.NOTHING  # of a gap that is not resolved
+    if (whole > 0.0).all():
+        share = (means["paper"] - means["row"]) / whole
+        closed = statistics.between(float(share[0]), share[1:])
     return Gap(paper, row, errors, closed, float(travel))
 
 
