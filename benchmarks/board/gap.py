@@ -30,8 +30,6 @@ from pam_envs.arrays import Array
 FILE = Path(__file__).with_name("gap.yaml")
 ENOUGH = 0.6
 """Share of the gap below which the page gives the reason."""
-KINDS = ("randomised", "wrong_model", "payload")
-"""Endings of tracks on whose plants the controllers do not have the true model."""
 TRAVEL = "pressure_travel"
 INTRODUCTION = """\
 # Distance from the oracle
@@ -63,6 +61,12 @@ improvement; *matched* is the best other controller with the same use of preview
 def beyond() -> tuple[str, ...]:
     """Return the names of the controllers beyond the papers."""
     return tuple(yaml_file.read(FILE, "list of controllers")["beyond"])
+
+
+@lru_cache(maxsize=1)
+def kinds() -> tuple[str, ...]:
+    """Return the endings of tracks of whose plants the controllers do not have the true model."""
+    return tuple(yaml_file.read(FILE, "list of kinds of tracks")["kinds"])
 
 
 @lru_cache(maxsize=1)
@@ -275,7 +279,7 @@ def _gains(tracks: Mapping[str, Track]) -> list[str]:
             else [f"`{views.name_of(same.rival)}`", percent(same.lower_by)]
         )
         lines.append(cells)
-    for kind in KINDS:
+    for kind in kinds():
         named = [rows for name, rows in tracks.items() if name.endswith(kind)]
         counts[kind] = [(made := gain(rows)) is not None and made.holds for rows in named]
     words = ", ".join(
