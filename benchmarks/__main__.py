@@ -151,6 +151,21 @@ def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
     return 0
 
 
+def gap(results: Path = rows.RESULTS) -> int:
+    """Print the distance of the best classical controllers from the oracle (leaderboard/gap.md).
+
+    Args:
+        results: Folder of the rows and of the oracle's bounds.
+    """
+    from benchmarks.board import gap as gaps
+    from benchmarks.board import leaderboard, standings
+    from benchmarks.bounds import run as bounding
+
+    tracks = standings.tracks(leaderboard.load(results))
+    print(gaps.page_text(tracks, bounding.read(results)), end="")
+    return 0
+
+
 def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
     """Write the interactive page of all rows: one folder of static files.
 
@@ -308,13 +323,19 @@ def papers(
     return 1 if any(figure.unexplained for figure in figures) else 0
 
 
-def bound(track: Positional[tuple[str, ...]], episodes: int = 4, horizon: int = 60) -> int:
+def bound(
+    track: Positional[tuple[str, ...]],
+    episodes: int = 2,
+    horizon: int = 60,
+    write: bool = False,
+) -> int:
     """Estimate the smallest error of tracks: a controller that knows plant, state and future.
 
     Args:
         track: Names of scenario files.
-        episodes: Number of episodes of each scenario.
+        episodes: Number of episodes of each scenario, its first public ones.
         horizon: Control periods that are predicted.
+        write: Write the result into benchmarks/results/oracle.json.xz, which the board reads.
     """
     from benchmarks.bounds import run as bounding
 
@@ -322,6 +343,8 @@ def bound(track: Positional[tuple[str, ...]], episodes: int = 4, horizon: int = 
         with progress("scenarios") as start:
             found = bounding.bounds_of(chosen, episodes, horizon, start(len(chosen.scenarios())))
         print(bounding.table(chosen, found), flush=True)
+        if write:
+            bounding.write({chosen.name: found})
     return 0
 
 
@@ -631,6 +654,7 @@ def dataset(
 COMMANDS: dict[str, Callable[..., int]] = {
     "run": run,
     "board": board,
+    "gap": gap,
     "site": site,
     "verify": verify,
     "void": void,

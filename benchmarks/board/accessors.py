@@ -70,6 +70,11 @@ def is_informed(row: Mapping[str, Any]) -> bool:
     return bool(row["controller"].get("claimed") == TRUE)
 
 
+def preview_of(row: Mapping[str, Any]) -> float:
+    """Return the preview horizon that the row's controller uses [s], as measured."""
+    return float(row["controller"]["preview_seconds"])
+
+
 def is_audited(row: Mapping[str, Any]) -> bool:
     """Return whether the row is in the audit round of its track."""
     return row["audit"] is not None

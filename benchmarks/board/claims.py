@@ -47,6 +47,23 @@ def best_paper(rows: Sequence[Row]) -> Row | None:
     return next((row for row in standings.ordered(rows) if is_paper(row)), None)
 
 
+def _matched(row: Row, rows: Sequence[Row], paper: Row) -> list[str]:
+    """Return the objection to a lower error that may be due to the preview, if there is one.
+
+    If ``row`` uses preview and ``paper``, the best paper controller, none, it has to be better than
+    the best paper controller with preview as well.
+    """
+    if not views.preview_of(row) or views.preview_of(paper):
+        return []
+    rival = best_paper([other for other in rows if views.preview_of(other)])
+    found = None if rival is None else standings.improvement(row, rival)
+    if rival is None or found is None:
+        return [f"uses {views.preview_of(row):g} s of preview, no paper controller does"]
+    if found.value > PROBABILITY and found.low > LOWER_BOUND:
+        return []
+    return [f"P {found.value:.2f} against {views.name_of(rival)}, which uses preview as well"]
+
+
 def cost_ratios(row: Row, paper: Row, split: str) -> dict[str, float]:
     """Return each cost over the paper controller's, means over the episodes of a split."""
     known = of_track(views.content_of(row))
@@ -131,7 +148,7 @@ def learned_claims(rows: Sequence[Row]) -> list[Claim]:
         return []
     doubts = _doubts_of_track(rows, paper)
     learned = [row for row in standings.ordered(rows) if not views.is_classical(row)]
-    made = [claim(row, paper, doubts) for row in learned]
+    made = [claim(row, paper, [*doubts, *_matched(row, rows, paper)]) for row in learned]
     order = (BETTER, DEARER, NOT_SHOWN)
 
     def rank(entry: Claim) -> tuple[int, bool, float]:

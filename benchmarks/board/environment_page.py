@@ -164,7 +164,7 @@ def _origins(rows: Sequence[Row]) -> fmt.Table:
     """Return kind, model knowledge, preview and verification of each row."""
 
     def preview(row: Row) -> str:
-        seconds = row["controller"]["preview_seconds"]
+        seconds = views.preview_of(row)
         return f"{seconds:g} s" if seconds else "none"
 
     columns: Cells = {

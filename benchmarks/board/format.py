@@ -11,6 +11,8 @@ WIDTH = 150  # largest number of characters of a table's line; a wider table is 
 LEFT = {
     *("controller", "environment", "track", "knows", "verdict", "kind", "state", "episodes"),
     *("best paper controller<br>best learned", "first here", "tuning", "hardware"),
+    *("best classical", "paper's controller", "best without preview", "best with preview"),
+    *("best other", "result", "matched"),
 }
 """Columns of words, aligned to the left."""
 

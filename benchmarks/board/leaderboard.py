@@ -2,16 +2,19 @@
 
 import html
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from benchmarks.board import accessors as views
-from benchmarks.board import plots, standings
+from benchmarks.board import gap, plots, standings
 from benchmarks.board.environment_page import page_text
 from benchmarks.board.format import number, table
 from benchmarks.board.summary import board_text
 from benchmarks.board.words import Cells, by_controller, short_env
+from benchmarks.bounds import run as bounding
+from benchmarks.bounds.run import Bounds
 from benchmarks.identity import audit
 from benchmarks.runs import rows, verified
 from benchmarks.runs.rows import Row
@@ -37,8 +40,13 @@ def load(folder: Path) -> list[Row]:
     return loaded
 
 
-def files(all_rows: Sequence[Row]) -> dict[str, str]:
-    """Return the texts of the board's files by their paths beside the board, the board first."""
+def files(
+    all_rows: Sequence[Row], bounds: Mapping[str, Bounds] = MappingProxyType({})
+) -> dict[str, str]:
+    """Return the texts of the board's files by their paths beside the board, the board first.
+
+    ``bounds`` are the oracle's, by track.
+    """
     all_rows = [_escaped(row) for row in all_rows]
     tracks = standings.tracks(all_rows)
     grouped = standings.by_env(tracks)
@@ -50,6 +58,7 @@ def files(all_rows: Sequence[Row]) -> dict[str, str]:
         for track, path in figures.items():
             texts[f"{PAGES}/{path}"] = plots.track_figure(held[track])
     if tracks:
+        texts[f"{PAGES}/gap.md"] = gap.page_text(tracks, bounds)
         texts[f"{PAGES}/times.md"] = times_text(all_rows)
     return texts
 
@@ -65,7 +74,7 @@ def _escaped(value: Any) -> Any:
 
 def write(folder: Path = rows.RESULTS, board: Path = BOARD) -> list[Path]:
     """Write the board, its pages, figures and times in place of earlier ones; return paths."""
-    texts = files(load(folder))
+    texts = files(load(folder), bounding.read(folder))
     first = texts.pop(BOARD.name)
     pages = {name.removeprefix(f"{PAGES}/"): text for name, text in texts.items()}
     written = write_folder(board.parent / PAGES, pages)

@@ -22,9 +22,10 @@ INTRODUCTION = """\
 # Leaderboard
 
 Written by `python -m benchmarks board` from the rows in `benchmarks/results`; do not edit. Each
-environment has a page with its tracks and all its controllers. `python -m benchmarks show-row ROW`
-prints a row, `verify ROW` computes it again, `cite ROW` prints BibTeX, and `python -m benchmarks
-site` writes an interactive page with trajectories.
+environment has a page with its tracks and all its controllers; a page shows the
+[distance from an oracle](leaderboard/gap.md). `python -m benchmarks show-row ROW` prints a row,
+`verify ROW` computes it again, `cite ROW` prints BibTeX, and `python -m benchmarks site` writes an
+interactive page with trajectories.
 """
 NOMINAL = "*P* is the probability of improvement. With 95 % intervals, costs and reasons:"
 RANK_CHANGES = """\

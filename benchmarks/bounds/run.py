@@ -1,47 +1,94 @@
-"""Bounds of tracks: episodes of the oracle, scored as those of a controller."""
+"""Bounds of tracks: episodes of the oracle, scored as those of a controller, and their file.
 
-from collections.abc import Callable
-from dataclasses import dataclass
+The episodes are the first public ones of each scenario, so that they are paired with those of every
+row. An oracle has no row: it is not in the catalogue, and it is never ranked.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from filelock import FileLock
 
-from agents.settings.seeds import tuning
 from benchmarks.bounds.oracle import PLAIN, TARGETS, Oracle
+from benchmarks.identity import tasks
 from benchmarks.runs.rollout import Episode
+from benchmarks.runs.rows import RESULTS
+from benchmarks.runs.store import read_record, write_record
 from benchmarks.scenarios.scenario import Scenario, ScenarioSet
 from benchmarks.scenarios.scenario_env import make_batch
-from benchmarks.scoring.metrics import headline_of, scores_of, shown
+from benchmarks.scoring.metrics import COSTS, headline_of, headlines_of, of_track, scores_of, shown
 from pam_envs.arrays import Array
 
+EPISODES = 2
+"""Episodes of each scenario: an interval needs the scatter within one."""
 HORIZON = 60
 """Control periods: dead time, and a travel of 0.5 s at the rate limit."""
+FILE = "oracle.json.xz"
+"""Beside the rows: the bounds of each track."""
+SCHEMA = 1
 
 
 @dataclass(frozen=True)
 class Bound:
-    """Headlines of the oracle in one scenario [SI], one an episode."""
+    """Episode of the oracle: its scores [SI], the headline first among them, and its costs."""
 
     scenario: str
-    seeds: tuple[int, ...]
-    errors: tuple[float, ...]
+    seed: int
+    failed: bool
+    scores: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Bounds of a track.
+
+    Attributes
+    ----------
+    task : str
+        Digest of the task; with another one the bounds are void.
+    horizon : int
+        Control periods that the oracle predicts.
+    episodes : sequence of Bound
+        Those of all scenarios.
+    """
+
+    task: str
+    horizon: int
+    episodes: Sequence[Bound]
 
 
 def bounds_of(
     track: ScenarioSet,
-    episodes: int = 4,
+    episodes: int = EPISODES,
     horizon: int = HORIZON,
     advance: Callable[[], None] = lambda: None,
-) -> list[Bound]:
-    """Return the bounds of every scenario of a track, on tuning seeds."""
-    headline = headline_of(track.content)
+) -> Bounds:
+    """Return the bounds of a track on the first public episodes of every scenario."""
+    most = track.content["seeds"]
+    if not 1 <= episodes <= most:
+        raise ValueError(
+            f"episodes = {episodes} must be from 1 to {most}, the public episodes of a scenario of "
+            f"{track.name}"
+        )
     found = []
-    for k, scenario in enumerate(track.scenarios()):
-        seeds = tuple(tuning(episodes * (k + 1))[-episodes:])
-        made = play(track, scenario, seeds, horizon)
-        errors = (scores_of(e, track.content, scenario.rests)[headline] for e in made)
-        found.append(Bound(scenario.name, seeds, tuple(errors)))
+    for scenario in track.scenarios():
+        seeds = track.seeds[scenario.name][:episodes]
+        for seed, episode in zip(seeds, play(track, scenario, seeds, horizon), strict=True):
+            scores = scores_of(episode, track.content, scenario.rests)
+            kept = {name: scores[name] for name in metrics_of(track.content)}
+            found.append(Bound(scenario.name, seed, episode.failed, kept))
         advance()
-    return found
+    return Bounds(tasks.of(track).identity.digest, horizon, tuple(found))
+
+
+def metrics_of(content: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the stored metrics of a track: its headlines and its costs."""
+    beside = (metric for metric, _, _ in headlines_of(content))
+    costs = (metric for metric in COSTS if metric in of_track(content))
+    return tuple(dict.fromkeys((headline_of(content), *beside, *costs)))
 
 
 def play(
@@ -58,31 +105,32 @@ def play(
         horizon,
     )
     oracle.start(_held(env, observation))
-    infos, actions, over = [], [], np.zeros(len(seeds), bool)
-    ended = np.zeros(len(seeds), bool)
-    while not over.all():
+    infos, actions = [], []
+    running, ended = np.ones(len(seeds), bool), np.zeros(len(seeds), bool)
+    lengths = np.zeros(len(seeds), int)
+    while running.any():
         action = oracle.act()
         _, _, terminated, truncated, info = env.step(action)
         over = terminated | truncated
-        ended |= terminated
         if over.any():
             info = {k: np.where(over, info["final_info"][k], info[k]) for k in oracle.keys}
         infos.append(np.array([info[key] for key in oracle.keys]))
         actions.append(action)
-        if ended.any():
-            break
+        lengths[running] += 1
+        ended |= running & terminated
+        running &= ~over
     table, given = np.array(infos), np.array(actions)
     env.close()
     return [
         Episode(
-            signals={key: table[:, k, row] for k, key in enumerate(oracle.keys)},
-            observations=np.zeros((len(given), 0)),
-            actions=given[:, row],
+            signals={key: table[:n, k, row] for k, key in enumerate(oracle.keys)},
+            observations=np.zeros((n, 0)),
+            actions=given[:n, row],
             seconds=np.zeros(0),
             period=float(env.control_period),
             failure="a limit ended the episode" if ended[row] else "",
         )
-        for row in range(len(seeds))
+        for row, n in enumerate(lengths.tolist())
     ]
 
 
@@ -97,13 +145,41 @@ def _held(env: object, observation: Array) -> Array:
     return made
 
 
-def table(track: ScenarioSet, found: list[Bound]) -> str:
+def read(folder: Path = RESULTS) -> dict[str, Bounds]:
+    """Return the stored bounds beside the rows of a folder, by track; none without the file."""
+    path = folder / FILE
+    if not path.exists():
+        return {}
+    record = read_record(path)
+    if record.get("schema") != SCHEMA:
+        raise ValueError(
+            f"{path} is not of schema {SCHEMA}; restore it from git, or remove it and run `python "
+            "-m benchmarks bound TRACK --write`"
+        )
+    return {
+        name: Bounds(one["task"], one["horizon"], tuple(Bound(**e) for e in one["episodes"]))
+        for name, one in record["tracks"].items()
+    }
+
+
+def write(found: Mapping[str, Bounds], folder: Path = RESULTS) -> Path:
+    """Write bounds of tracks into the file beside the rows, in place of older ones."""
+    path = folder / FILE
+    with FileLock(folder / f".{FILE}.lock"):
+        known = {**read(folder), **found}
+        tracks = {name: asdict(known[name]) for name in sorted(known)}
+        write_record(path, {"schema": SCHEMA, "tracks": tracks})
+    return path
+
+
+def table(track: ScenarioSet, found: Bounds) -> str:
     """Return the bounds as text, in the unit of the track."""
-    unit, factor = shown(track.content)
-    every = [error for bound in found for error in bound.errors]
-    lines = [
-        f"{track.name}: {factor * float(np.mean(every)):.3g} {unit} over {len(every)} episodes"
-    ]
-    for bound in found:
-        lines.append(f"  {bound.scenario}: {factor * float(np.mean(bound.errors)):.3g} {unit}")
+    (unit, factor), headline = shown(track.content), headline_of(track.content)
+
+    def mean(episodes: Iterable[Bound]) -> str:
+        return f"{factor * float(np.mean([e.scores[headline] for e in episodes])):.3g} {unit}"
+
+    lines = [f"{track.name}: {mean(found.episodes)} over {len(found.episodes)} episodes"]
+    for name in dict.fromkeys(e.scenario for e in found.episodes):
+        lines.append(f"  {name}: {mean(e for e in found.episodes if e.scenario == name)}")
     return "\n".join(lines)

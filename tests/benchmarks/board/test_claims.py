@@ -197,6 +197,34 @@ def test_round_entrant_without_row_prevents_claims():
     assert found.reasons == ("lost is in the audit round and has no row",)
 
 
+def previewing(row: dict[str, Any]) -> dict[str, Any]:
+    row["controller"]["preview_seconds"] = 0.2
+    return row
+
+
+def test_learned_row_with_preview_has_to_beat_the_best_paper_controller_with_preview():
+    costs = {"constraint_cost": 0.01, "air_use": 1e-5}
+    (alone,) = claims.learned_claims(in_round(PAPER, previewing(learned())))
+    reason = "uses 0.2 s of preview, no paper controller does"
+    assert (alone.verdict, alone.reasons) == (claims.NOT_SHOWN, (reason,))
+    worse = previewing(fakes.row("ahead", 2e-3, audit=2e-3, **costs))
+    (beaten,) = claims.learned_claims(in_round(PAPER, worse, previewing(learned())))
+    assert (beaten.verdict, views.name_of(beaten.paper)) == (claims.BETTER, "inverse")
+    # lower than ten seeds in most episodes, and higher in the mean than the controller without
+    erratic = previewing(fakes.row("ahead", 1.1e-3, audit=1.1e-3, **costs))
+    for episode in erratic["episodes"]:
+        episode["scores"]["rms_error"] = 0.1e-3 if episode["scenario"] == "sines" else 3e-3
+    (even,) = claims.learned_claims(in_round(PAPER, erratic, previewing(learned())))
+    reason = "P 0.50 against ahead, which uses preview as well"
+    assert (even.verdict, even.reasons) == (claims.NOT_SHOWN, (reason,))
+
+
+def test_learned_row_without_preview_may_beat_a_paper_controller_with_preview():
+    paper = previewing(fakes.row("ahead", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5))
+    (found,) = claims.learned_claims(in_round(paper, learned()))
+    assert found.verdict == claims.BETTER
+
+
 def test_negligible_constraint_cost_counts_as_none():
     clean = fakes.row("inverse", 1e-3, constraint_cost=0.0)
 
