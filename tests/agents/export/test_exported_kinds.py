@@ -24,7 +24,10 @@ from agents.vec_envs.residual import parts_of
 from baselines.core.catalogue import make_controller
 
 Run = Callable[[str], tuple[Any, Path]]
-REMEMBERS = ("recurrent", "plain_recurrent", "history", "residual_sac", "residual_recurrent")
+REMEMBERS = (
+    *("recurrent", "plain_recurrent", "history", "residual_sac", "residual_recurrent"),
+    *("strided", "privileged_recurrent"),
+)
 CORRECTS = ("residual", "residual_sac", "residual_recurrent")
 ROOT = Path(__file__).resolve().parents[3]
 
