@@ -149,11 +149,12 @@ def _baseline(layer: ResidualVecEnv, env: str) -> dict[str, Any]:
     kinds: dict[str, list[dict[str, Any]]] = {}
     for kind, plant in _kinds(layer):
         kinds.setdefault(plant.digest(), []).append(kind)
-    plants = layer.get_attr("plant")
-    made = {plants[rows.start or 0].digest(): made for rows, made in layer.controllers}
+    pairs = zip(layer.plants, layer.controllers, strict=True)
+    made = {plant.digest(): controller for plant, (_, controller) in pairs}
     recorded = [
         {"plant": digest, **record(env, kinds[digest], controller, layer.name).as_dict()}
         for digest, controller in made.items()
+        if digest in kinds
     ]
     layer.record = {"name": layer.name, "scale": float(layer.scale), "recorded": recorded}
     return layer.record
@@ -186,9 +187,7 @@ def _normaliser(graph: Graph, model: BaseAlgorithm) -> None:
     graph.add("Cast", to=TensorProto.FLOAT)
 
 
-def _features(
-    graph: Graph, extractor: nn.Module, hidden: PrivilegedVecEnv | None = None
-) -> str:
+def _features(graph: Graph, extractor: nn.Module, hidden: PrivilegedVecEnv | None = None) -> str:
     """Append the fixed differences; return the name of the inputs.
 
     The parameters that an actor sees, the last columns of its matrix, are the nominal ones.

@@ -198,7 +198,9 @@ class RecurrentStructuredPolicy(_LinearPath, RecurrentActorCriticPolicy):
         if self.critic_matrix:  # the critic without an LSTM, with its own number of inputs
             self.critic = nn.Linear(self.critic_inputs, self.lstm_output_dim)
             rate = self.optimizer.param_groups[0]["lr"]
-            self.optimizer = self.optimizer_class(self.parameters(), lr=rate, **self.optimizer_kwargs)
+            self.optimizer = self.optimizer_class(
+                self.parameters(), lr=rate, **self.optimizer_kwargs
+            )
 
     @staticmethod
     def _process_sequence(

@@ -37,6 +37,8 @@ from pam_envs.wording import near
 FOLDER = Path(__file__).resolve().parents[1] / "configs"
 ALGORITHMS: tuple[str, ...] = ("ppo", "sac", "tqc", "recurrent_ppo")
 ON_POLICY = ("ppo", "recurrent_ppo")
+MODEL = "model"
+"""Entry of ``mix`` with arguments of the controller's nominal plant."""
 OPTIONAL = (
     *("share", "mix", "per_reference", "cost", "history", "residual", "plants", "widening"),
     *("privileged", "adaptation", "evaluation", "search"),
@@ -54,10 +56,12 @@ class Config:
     ``steps`` and ``checkpoint_steps`` count control periods of all rows of the batched environment
     together. ``share`` has arguments of the environment that differ among the rows, each a list:
     the rows are divided evenly among all combinations, the kinds of rows. ``mix`` is a list of sets
-    of arguments, each of which is combined with all of these. ``per_reference`` has further
-    arguments by the kind's reference, for example reward weights that balance references with small
-    and with large errors. The parts are described in :mod:`agents.settings.parts`; of
-    those of the algorithms only that of ``algo`` is used. ``schema`` is the version of this schema.
+    of arguments, each of which is combined with all of these; in an entry, ``model`` has arguments
+    of the nominal plant from which a residual's controller is built, as in a scenario file.
+    ``per_reference`` has further arguments by the kind's reference, for example reward weights that
+    balance references with small and with large errors. The parts are described in
+    :mod:`agents.settings.parts`; of those of the algorithms only that of ``algo`` is used.
+    ``schema`` is the version of this schema.
     """
 
     env: str
@@ -135,6 +139,9 @@ class Config:
                 "mix sets hysteresis, or randomize beside plants.randomize: true; leave hysteresis "
                 "to plants, and plants.randomize false"
             )
+        for entry in self.mix:
+            if not isinstance(entry.get(MODEL, {}), Mapping):
+                raise SettingsError(f"mix: model = {entry[MODEL]!r} must be a mapping")
         for name, values in self.share.items():
             if not isinstance(values, list) or not values:
                 raise SettingsError(f"share.{name} = {values!r} must be a list of values")
@@ -152,6 +159,17 @@ class Config:
 
     def kinds(self) -> tuple[dict[str, Any], ...]:
         """Return the environment's arguments of each kind of rows."""
+        return tuple({k: v for k, v in kind.items() if k != MODEL} for kind in self._rows())
+
+    def models(self) -> tuple[dict[str, Any], ...]:
+        """Return the controller's arguments of each kind of rows, {} for the rows' nominal plant.
+
+        They are complete: those of the environment with the changes of ``model``.
+        """
+        kinds = zip(self.kinds(), self._rows(), strict=True)
+        return tuple({**kind, **row[MODEL]} if row.get(MODEL) else {} for kind, row in kinds)
+
+    def _rows(self) -> tuple[dict[str, Any], ...]:
         laws = {"hysteresis": list(self.plants.hysteresis)} if self.plants.hysteresis else {}
         shared = {**laws, **self.share}
         base = {**self.env_kwargs, **({"randomize": True} if self.plants.randomize else {})}

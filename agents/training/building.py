@@ -15,7 +15,7 @@ from agents.settings import seeds
 from agents.settings.parts import Cost, Widening
 from agents.settings.presets import ON_POLICY, Config
 from agents.settings.schema import SettingsError
-from agents.vec_envs.batch import make_batch_vec_env
+from agents.vec_envs.batch import make_batch_vec_env, nominal_plant
 from agents.vec_envs.cost import CostVecEnv
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.privileged import PrivilegedVecEnv
@@ -45,7 +45,7 @@ def make_env(config: Config) -> VecEnv:
         env = WideningVecEnv(env, config.widening)
     if corrected:
         made = partial(make_controller, corrected, signals=signals, action_signals=actions)
-        env = ResidualVecEnv(env, corrected, made, scale)
+        env = ResidualVecEnv(env, corrected, made, scale, controller_plants(config, env))
     if config.history.frames:
         past = config.history
         kept = kept_inputs(config, signals, actions)
@@ -63,6 +63,15 @@ def make_env(config: Config) -> VecEnv:
         clip_reward=normalize.clip_reward,
         gamma=config.chosen.gamma,
     )
+
+
+def controller_plants(config: Config, env: VecEnv) -> list[Any]:
+    """Return the nominal plant of the corrected controller, one for each batch of rows."""
+    batches: Any = env.unwrapped
+    return [
+        nominal_plant(config.env, model) if model else batch.unwrapped.plant
+        for batch, model in zip(batches.batches, config.models(), strict=True)
+    ]
 
 
 def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:

@@ -38,6 +38,12 @@ def make_batch_vec_env(env_id: str, num_envs: int, *kinds: Mapping[str, Any], **
     )
 
 
+def nominal_plant(env_id: str, arguments: Mapping[str, Any]) -> Any:
+    """Return the nominal plant of an environment with these arguments."""
+    made: Any = gym.make_vec(env_id, 1, vectorization_mode="vector_entry_point", **arguments)
+    return made.unwrapped.plant
+
+
 class BatchVecEnv(VecEnv):
     """``VecEnv`` over the rows of batched Gymnasium environments, one batch after the other.
 
@@ -73,9 +79,13 @@ class BatchVecEnv(VecEnv):
             ends[-1], batches[0].single_observation_space, batches[0].single_action_space
         )
 
-    def parts(self) -> Iterator[tuple[slice, Any]]:
-        """Yield the rows of each plant; adjacent batches of equal plants are one entry."""
-        plants = [(rows, self._base(i).plant) for i, rows in enumerate(self.slices)]
+    def parts(self, plants: Sequence[Any] = ()) -> Iterator[tuple[slice, Any]]:
+        """Yield the rows of each plant; adjacent batches of equal plants are one entry.
+
+        ``plants`` replaces the nominal plants of the batches, one for each.
+        """
+        own = plants or [self._base(i).plant for i in range(len(self.batches))]
+        plants = list(zip(self.slices, own, strict=True))
         for _, group in itertools.groupby(plants, key=lambda pair: pair[1].digest()):
             pairs = list(group)
             yield slice(pairs[0][0].start, pairs[-1][0].stop), pairs[0][1]
@@ -245,9 +255,7 @@ def _rows_of(infos: Mapping[str, Any], rows: int) -> list[dict[str, Any]]:
     return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
-def _last_info(
-    infos: Mapping[str, Any], row: int, truncated: bool, by_row: bool
-) -> dict[str, Any]:
+def _last_info(infos: Mapping[str, Any], row: int, truncated: bool, by_row: bool) -> dict[str, Any]:
     last = infos.get("final_info", {}) if by_row else {}
     made = {k: v[row].item() for k, v in last.items() if not k.startswith("_")}
     made["terminal_observation"] = infos["final_obs"][row]

@@ -70,9 +70,7 @@ class CostVecEnv(VecEnvWrapper):
             return size
         return np.where(size <= limit, size * size, limit * (2.0 * size - limit))
 
-    def _cut_off(
-        self, done: NDArray[np.bool_], infos: list[dict[str, Any]]
-    ) -> NDArray[np.float64]:
+    def _cut_off(self, done: NDArray[np.bool_], infos: list[dict[str, Any]]) -> NDArray[np.float64]:
         """Return the number of control periods that a limit has cut off in each row."""
         left = np.zeros(self.num_envs)
         for row in np.flatnonzero(done).tolist():

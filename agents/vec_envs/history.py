@@ -16,9 +16,7 @@ class HistoryVecEnv(VecEnvWrapper):
     The latest comes first; at reset they equal the present.
     """
 
-    def __init__(
-        self, venv: VecEnv, columns: Sequence[int], frames: int, stride: int = 1
-    ) -> None:
+    def __init__(self, venv: VecEnv, columns: Sequence[int], frames: int, stride: int = 1) -> None:
         self.columns = list(columns)
         self.frames, self.stride = frames, stride
         box: Any = venv.observation_space

@@ -26,7 +26,9 @@ class WideningVecEnv(VecEnvWrapper):
         self.settings = settings
         base: Any = venv.unwrapped
         self.base = base
-        self.batches = [(rows, batch.unwrapped) for rows, batch in zip(base.slices, base.batches)]
+        self.batches = [
+            (rows, batch.unwrapped) for rows, batch in zip(base.slices, base.batches, strict=True)
+        ]
         plain = [rows for rows, batch in self.batches if not batch.ranges]
         drawn = [(rows, batch) for rows, batch in self.batches if batch.ranges]
         if not plain or not drawn:
@@ -109,7 +111,10 @@ class WideningVecEnv(VecEnvWrapper):
         low, high = (end[row] for end in self._present())
         with np.errstate(invalid="ignore", divide="ignore"):
             place = (self.parameters[row] - low) / (high - low)
-        for side, near in ((LOW, place <= self.settings.edge), (HIGH, place >= 1.0 - self.settings.edge)):
+        for side, near in (
+            (LOW, place <= self.settings.edge),
+            (HIGH, place >= 1.0 - self.settings.edge),
+        ):
             for k in np.flatnonzero(near).tolist():
                 self.costs[side, k, self.seen[side, k] % self.settings.episodes] = cost
                 self.seen[side, k] += 1

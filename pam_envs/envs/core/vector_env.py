@@ -300,7 +300,9 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         """
         fixed = np.asarray(self._all[1], np.float64)[:, : len(self.plant.names)]
         lanes = np.moveaxis(fixed, 1, 2).reshape(-1, fixed.shape[1])
-        return lanes[: self.num_envs] if self.setup.drawn else np.repeat(lanes[:1], self.num_envs, 0)
+        return (
+            lanes[: self.num_envs] if self.setup.drawn else np.repeat(lanes[:1], self.num_envs, 0)
+        )
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
