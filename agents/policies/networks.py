@@ -158,7 +158,8 @@ class _LinearPath(ActorCriticPolicy):
         self.hold = hold
         self.critic_matrix = critic_matrix
         self.critic_lstm = bool(kwargs.get("enable_critic_lstm", True))
-        super().__init__(*args, **kwargs, share_features_extractor=critic_matrix is None)
+        kwargs["share_features_extractor"] = critic_matrix is None
+        super().__init__(*args, **kwargs)
 
     @property
     def critic_inputs(self) -> int:
@@ -198,9 +199,8 @@ class RecurrentStructuredPolicy(_LinearPath, RecurrentActorCriticPolicy):
         if self.critic_matrix:  # the critic without an LSTM, with its own number of inputs
             self.critic = nn.Linear(self.critic_inputs, self.lstm_output_dim)
             rate = self.optimizer.param_groups[0]["lr"]
-            self.optimizer = self.optimizer_class(
-                self.parameters(), lr=rate, **self.optimizer_kwargs
-            )
+            make: Any = self.optimizer_class
+            self.optimizer = make(self.parameters(), lr=rate, **self.optimizer_kwargs)
 
     @staticmethod
     def _process_sequence(

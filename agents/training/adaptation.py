@@ -51,7 +51,8 @@ def learn(
     env = teacher.get_env()
     hidden = layer(env, PrivilegedVecEnv)
     assert hidden is not None
-    seen = hidden.venv.observation_space.shape[0]
+    space: Any = hidden.venv.observation_space
+    seen = space.shape[0]
     random = np.random.default_rng([seed, 1])
     policy = student.policy
     optimiser = torch.optim.Adam(policy.parameters(), settings.learning_rate[0])
@@ -72,10 +73,12 @@ def learn(
         with torch.no_grad():
             losses.append(float(_error(policy, *batch)))
         for _ in range(settings.n_epochs):
-            order = torch.from_numpy(random.permutation(len(targets)))
-            for rows in order.split(settings.batch_size):
+            order = random.permutation(len(targets))
+            for at in range(0, len(order), settings.batch_size):
+                rows = torch.from_numpy(order[at : at + settings.batch_size])
+                error: Any = _error(policy, *(part[rows] for part in batch))
                 optimiser.zero_grad()
-                _error(policy, *(part[rows] for part in batch)).backward()
+                error.backward()
                 optimiser.step()
         advance(per_round, f", error {losses[-1]:.3g}")
     student.num_timesteps = teacher.num_timesteps + rounds * per_round

@@ -41,9 +41,10 @@ class PrivilegedVecEnv(VecEnvWrapper):
         self.parameters = np.zeros((venv.num_envs, len(self.names)), np.float32)
         width = len(self.names) + len(self.states)
         box: Any = venv.observation_space
-        ends = (np.concatenate([box.low, np.full(width, -CLIP, np.float32)]),)
-        ends += (np.concatenate([box.high, np.full(width, CLIP, np.float32)]),)
-        super().__init__(venv, spaces.Box(*ends, dtype=np.float32))
+        low, high = box.low, box.high
+        low = np.concatenate([low, np.full(width, -CLIP, np.float32)])
+        high = np.concatenate([high, np.full(width, CLIP, np.float32)])
+        super().__init__(venv, spaces.Box(low, high, dtype=np.float32))
 
     def _scaled(self, parameters: NDArray[np.float64]) -> NDArray[np.float32]:
         made: NDArray[np.float64] = 2.0 * (parameters - self.low) / self.span - 1.0
