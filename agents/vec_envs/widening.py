@@ -70,8 +70,9 @@ class WideningVecEnv(VecEnvWrapper):
     def _present(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the present ends of each row's ranges, shape (n_env, n_parameters) each."""
         low, high, nominal = self.ends
-        widths = self.widths
-        return nominal + widths[LOW] * (low - nominal), nominal + widths[HIGH] * (high - nominal)
+        least = nominal + self.widths[LOW] * (low - nominal)
+        most = nominal + self.widths[HIGH] * (high - nominal)
+        return np.maximum(least, low), np.minimum(most, high)
 
     def _apply(self) -> None:
         """Give the batches the present ranges."""
@@ -96,27 +97,28 @@ class WideningVecEnv(VecEnvWrapper):
         """Step all rows; see stable-baselines3."""
         observation, reward, done, infos = self.venv.step_wait()
         if done.any():
+            low, high = self._present()
+            with np.errstate(invalid="ignore", divide="ignore"):
+                places = (self.parameters - low) / (high - low)
             for row in np.flatnonzero(done).tolist():
-                self._count(row, -float(infos[row]["episode"]["r"]))
+                self._count(row, places[row], -float(infos[row]["episode"]["r"]))
             self.parameters = self.base.parameters()[:, self.columns]
             self._widen()
         return observation, reward, done, infos
 
-    def _count(self, row: int, cost: float) -> None:
-        """Count the cost of an episode at the ends of the ranges near which its parameters were."""
+    def _count(self, row: int, places: NDArray[np.float64], cost: float) -> None:
+        """Count the cost of an episode at the ends of the ranges near which its parameters were.
+
+        ``places`` are those of its parameters in their ranges, from 0 to 1, NaN if not drawn.
+        """
+        count, edge = self.settings.episodes, self.settings.edge
         if self.nominal_rows[row]:
-            self.nominal_costs[self.nominal_seen[0] % self.settings.episodes] = cost
+            self.nominal_costs[self.nominal_seen[0] % count] = cost
             self.nominal_seen += 1
             return
-        low, high = (end[row] for end in self._present())
-        with np.errstate(invalid="ignore", divide="ignore"):
-            place = (self.parameters[row] - low) / (high - low)
-        for side, near in (
-            (LOW, place <= self.settings.edge),
-            (HIGH, place >= 1.0 - self.settings.edge),
-        ):
+        for side, near in ((LOW, places <= edge), (HIGH, places >= 1.0 - edge)):
             for k in np.flatnonzero(near).tolist():
-                self.costs[side, k, self.seen[side, k] % self.settings.episodes] = cost
+                self.costs[side, k, self.seen[side, k] % count] = cost
                 self.seen[side, k] += 1
 
     def _widen(self) -> None:
