@@ -23,6 +23,7 @@ from agents.policies.networks import LayersAndInputs, LinearFeatures
 from agents.policies.policy import describe
 from agents.policies.policy_file import CARD, CONTROLLER, INPUT, SCHEMA, check_graph, write_policy
 from agents.vec_envs.history import HistoryVecEnv
+from agents.vec_envs.privileged import PrivilegedVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
@@ -47,7 +48,8 @@ def export_policy(
 
     ``model`` is a PPO, RecurrentPPO, SAC or TQC with its environment (a
     :class:`agents.vec_envs.batch.BatchVecEnv`, wrapped or not), which holds the signals and the
-    observation's normaliser. ``card`` are further entries of the card (seed, steps, command);
+    observation's normaliser. An actor that sees the plant's parameters is exported with the nominal
+    ones. ``card`` are further entries of the card (seed, steps, command);
     ``training``, its cost (times, machine), is written beside ``path``, into ``policy.json``. A
     ValueError says that the model has layers that the export does not support, or corrects a
     controller that is mostly saturated.
@@ -61,11 +63,11 @@ def policy_bytes(model: Any, card: Mapping[str, Any]) -> bytes:
     """Return the bytes of the policy file, a function of weights, normaliser and card alone."""
     graph = Graph()
     env = model.get_env()
-    corrects, past = _layer(env, ResidualVecEnv), _layer(env, HistoryVecEnv)
+    corrects, past = layer(env, ResidualVecEnv), layer(env, HistoryVecEnv)
     if corrects is not None:
         graph.join("Concat", [INPUT, CONTROLLER], axis=1)
     if past is not None:
-        graph.past(past.columns, past.frames)
+        graph.past(past.columns, past.frames * past.stride, past.shown)
     _normaliser(graph, model)
     _action(graph, model)
     _limits(graph, model.action_space)
@@ -82,7 +84,7 @@ def policy_bytes(model: Any, card: Mapping[str, Any]) -> bytes:
     return data
 
 
-def _layer(env: Any, kind: type[L]) -> L | None:
+def layer(env: Any, kind: type[L]) -> L | None:
     """Return the wrapper of the given class around the environment, or None."""
     while hasattr(env, "venv"):
         if isinstance(env, kind):
@@ -114,7 +116,7 @@ def facts(model: BaseAlgorithm) -> dict[str, Any]:
             **{name: version(name) for name in PACKAGES},
         },
     }
-    corrects = _layer(env, ResidualVecEnv)
+    corrects = layer(env, ResidualVecEnv)
     return made if corrects is None else {**made, "baseline": _baseline(corrects, spec.id)}
 
 
@@ -147,11 +149,12 @@ def _baseline(layer: ResidualVecEnv, env: str) -> dict[str, Any]:
     kinds: dict[str, list[dict[str, Any]]] = {}
     for kind, plant in _kinds(layer):
         kinds.setdefault(plant.digest(), []).append(kind)
-    plants = layer.get_attr("plant")
-    made = {plants[rows.start or 0].digest(): made for rows, made in layer.controllers}
+    pairs = zip(layer.plants, layer.controllers, strict=True)
+    made = {plant.digest(): controller for plant, (_, controller) in pairs}
     recorded = [
         {"plant": digest, **record(env, kinds[digest], controller, layer.name).as_dict()}
         for digest, controller in made.items()
+        if digest in kinds
     ]
     layer.record = {"name": layer.name, "scale": float(layer.scale), "recorded": recorded}
     return layer.record
@@ -184,11 +187,18 @@ def _normaliser(graph: Graph, model: BaseAlgorithm) -> None:
     graph.add("Cast", to=TensorProto.FLOAT)
 
 
-def _features(graph: Graph, extractor: nn.Module) -> str:
-    """Append the fixed differences; return the name of the inputs."""
+def _features(graph: Graph, extractor: nn.Module, hidden: PrivilegedVecEnv | None = None) -> str:
+    """Append the fixed differences; return the name of the inputs.
+
+    The parameters that an actor sees, the last columns of its matrix, are the nominal ones.
+    """
     if isinstance(extractor, LinearFeatures):
-        matrix: Any = extractor.matrix
-        return graph.add("Gemm", array(matrix), transB=1)
+        matrix = array(extractor.matrix)
+        space: Any = None if hidden is None else hidden.venv.observation_space
+        if hidden is None or matrix.shape[1] == space.shape[0]:
+            return graph.add("Gemm", matrix, transB=1)
+        seen, parameters = np.split(matrix, [space.shape[0]], axis=1)
+        return graph.add("Gemm", seen, parameters @ hidden.nominal, transB=1)
     if isinstance(extractor, FlattenExtractor):
         return graph.last
     raise ValueError(f"the features of {type(extractor).__name__} cannot be exported")
@@ -196,18 +206,18 @@ def _features(graph: Graph, extractor: nn.Module) -> str:
 
 def _action(graph: Graph, model: Any) -> None:
     if isinstance(model, (PPO, RecurrentPPO)):
-        _gaussian_action(graph, model.policy)
+        _gaussian_action(graph, model.policy, layer(model.get_env(), PrivilegedVecEnv))
     elif isinstance(model, (SAC, TQC)):
         _squashed_action(graph, model)
     else:
         raise ValueError(f"{type(model).__name__} cannot be exported; PPO, SAC and TQC can")
 
 
-def _gaussian_action(graph: Graph, policy: Any) -> None:
+def _gaussian_action(graph: Graph, policy: Any, hidden: PrivilegedVecEnv | None) -> None:
     """Append the mean action of PPO, recurrent or not."""
     if policy.squash_output or not isinstance(policy.action_net, nn.Linear):
         raise ValueError("only PPO with a plain Gaussian action can be exported")
-    inputs = _features(graph, policy.pi_features_extractor)
+    inputs = _features(graph, policy.pi_features_extractor, hidden)
     layers, lstm = policy.mlp_extractor, getattr(policy, "lstm_actor", None)
     beside = isinstance(layers, LayersAndInputs)
     if lstm is not None:

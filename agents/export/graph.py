@@ -95,8 +95,12 @@ class Graph:
         bounds = [self.number(np.array([i], np.int64)) for i in (first, end, 1)]
         return self.join("Slice", [name, *bounds])
 
-    def past(self, columns: list[int], frames: int) -> None:
-        """Append the last ``frames`` values of some columns to the input, the latest first."""
+    def past(self, columns: list[int], frames: int, shown: list[int]) -> None:
+        """Append past values of some columns to the input, the latest first.
+
+        The state holds those of the last ``frames`` control periods; ``shown`` are the places of
+        the appended ones in it.
+        """
         seen = self.last
         held = self.recall(frames * len(columns))
         chosen = self.join("Gather", [seen, self.number(np.array(columns, np.int64))], axis=1)
@@ -105,6 +109,8 @@ class Graph:
         past = self.join("Add", [held, first])
         recent = [] if frames == 1 else [self.cut(past, 0, (frames - 1) * len(columns))]
         self.keep(self.join("Concat", [chosen, *recent], axis=1))
+        if len(shown) < frames * len(columns):
+            past = self.join("Gather", [past, self.number(np.array(shown, np.int64))], axis=1)
         self.join("Concat", [seen, past], axis=1)
 
     def lstm(self, layer: nn.LSTM) -> str:

@@ -107,6 +107,13 @@ KINDS: dict[str, Kind] = {
     "ppo-randomized": Kind(
         "randomized", "PPO with a history of the last control periods, trained on drawn plants", PPO
     ),
+    "ppo-robust": Kind(
+        "robust",
+        "PPO with a strided history, trained on drawn plants, paces and wearers; its critic saw "
+        "the parameters",
+        PPO,
+    ),
+    "ppo-rma": Kind("rma", "student of a PPO teacher that saw the parameters", PPO),
     "recurrent_ppo": Kind("recurrent", "PPO with an LSTM, inputs beside it", f"{PPO}; {LSTM}"),
     "sac": Kind("sac", "SAC, two layers; no memory", SAC),
     "tqc": Kind("tqc", "TQC, two layers; no memory", TQC),

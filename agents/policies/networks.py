@@ -34,9 +34,9 @@ def present_inputs(config: Config, signals: Signals, actions: Signals) -> tuple[
 
 def input_names(config: Config, signals: Signals, actions: Signals) -> tuple[str, ...]:
     """Return the names of the present inputs and of the history."""
-    past = config.history.signals
-    frames = range(1, config.history.frames + 1)
-    return (*present_inputs(config, signals, actions), *(f"{n}@{k}" for k in frames for n in past))
+    past, stride = config.history.signals, config.history.stride
+    ages = range(stride, stride * config.history.frames + 1, stride)
+    return (*present_inputs(config, signals, actions), *(f"{n}@{k}" for k in ages for n in past))
 
 
 def kept_inputs(config: Config, signals: Signals, actions: Signals) -> tuple[int, ...]:
@@ -71,8 +71,19 @@ def input_matrix(network: Network, names: tuple[str, ...]) -> Matrix:
     return tuple(tuple(row) for row in rows)
 
 
+def extended(matrix: Matrix, names: int, hidden: int, first: int) -> Matrix:
+    """Return an input matrix with ``hidden`` columns more, of which the first ``first`` are inputs.
+
+    ``names`` is the number of columns of ``matrix``.
+    """
+    rows = [(*row, *(0.0,) * hidden) for row in matrix]
+    width = names + hidden
+    rows += [tuple(float(j == names + i) for j in range(width)) for i in range(first)]
+    return tuple(rows)
+
+
 class LinearFeatures(BaseFeaturesExtractor):
-    """Inputs that are a fixed linear function of the observation."""
+    """Inputs that are a fixed linear function of the observation's first columns."""
 
     matrix: Tensor
 
@@ -82,7 +93,8 @@ class LinearFeatures(BaseFeaturesExtractor):
 
     def forward(self, observation: Tensor) -> Tensor:
         """Return the inputs, shape (batch, n_inputs)."""
-        return nn.functional.linear(observation.float(), self.matrix)
+        seen = observation[:, : self.matrix.shape[1]]
+        return nn.functional.linear(seen.float(), self.matrix)
 
 
 class LayersAndInputs(nn.Module):
@@ -133,22 +145,39 @@ class _LinearPath(ActorCriticPolicy):
     """Common part of the structured policies: the linear path, initialised to ``hold``.
 
     ``hold`` gives, for each action, the input that the untrained policy returns; empty for none.
+    ``critic_matrix`` maps the observation to inputs of the critic other than the actor's.
     """
 
-    def __init__(self, *args: Any, hold: tuple[int, ...] = (), **kwargs: Any) -> None:
+    def __init__(
+        self,
+        *args: Any,
+        hold: tuple[int, ...] = (),
+        critic_matrix: Matrix | None = None,
+        **kwargs: Any,
+    ) -> None:
         self.hold = hold
+        self.critic_matrix = critic_matrix
         self.critic_lstm = bool(kwargs.get("enable_critic_lstm", True))
+        kwargs["share_features_extractor"] = critic_matrix is None
         super().__init__(*args, **kwargs)
+
+    @property
+    def critic_inputs(self) -> int:
+        """Number of inputs of the critic."""
+        return len(self.critic_matrix) if self.critic_matrix else self.features_dim
 
     def _build_mlp_extractor(self) -> None:
         seen = self.features_dim
         recurrent = getattr(self, "lstm_output_dim", 0)
-        critic = recurrent + (seen if self.critic_lstm else 0)
+        critic = recurrent + (self.critic_inputs if self.critic_lstm else 0)
         hidden = [int(width) for width in self.net_arch]
         made: Any = LayersAndInputs(seen, hidden, self.activation_fn, recurrent, critic)
         self.mlp_extractor = made
 
     def _build(self, lr_schedule: Any) -> None:
+        if self.critic_matrix:
+            space: Any = self.observation_space
+            self.vf_features_extractor = LinearFeatures(space, self.critic_matrix)
         super()._build(lr_schedule)
         if self.hold:
             beside = self.mlp_extractor.latent_dim_pi - self.features_dim
@@ -164,6 +193,14 @@ class StructuredPolicy(_LinearPath):
 
 class RecurrentStructuredPolicy(_LinearPath, RecurrentActorCriticPolicy):
     """Recurrent actor-critic with a skip connection around the recurrent layer."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        if self.critic_matrix:  # the critic without an LSTM, with its own number of inputs
+            self.critic = nn.Linear(self.critic_inputs, self.lstm_output_dim)
+            rate = self.optimizer.param_groups[0]["lr"]
+            make: Any = self.optimizer_class
+            self.optimizer = make(self.parameters(), lr=rate, **self.optimizer_kwargs)
 
     @staticmethod
     def _process_sequence(
@@ -194,10 +231,13 @@ def critic_alone(policy: Any, alone: bool) -> None:
         parameter.requires_grad_(not alone or name.startswith(CRITIC))
 
 
-def policy_arguments(config: Config, signals: Signals, actions: Signals) -> dict[str, Any]:
+def policy_arguments(
+    config: Config, signals: Signals, actions: Signals, privileged: tuple[int, int] = (0, 0)
+) -> dict[str, Any]:
     """Return ``policy`` and ``policy_kwargs`` for stable-baselines3.
 
-    A SettingsError names an unknown signal, or a held signal whose range is not the action's.
+    ``privileged`` is the number of parameters and of true states in the observation. A
+    SettingsError names an unknown signal, or a held signal whose range is not the action's.
     """
     network = config.network
     names = input_names(config, signals, actions)
@@ -205,9 +245,18 @@ def policy_arguments(config: Config, signals: Signals, actions: Signals) -> dict
         "net_arch": list(network.hidden),
         "activation_fn": ACTIVATIONS[network.activation],
     }
-    if network.differences:
+    if network.differences or any(privileged):
+        matrix = input_matrix(network, names)
+        if config.sees_parameters:
+            parameters, states = privileged
+            first = parameters + (states if config.privileged.critic else 0)
+            kwargs["critic_matrix"] = extended(matrix, len(names), parameters + states, first)
+        if config.adaptation.steps:  # the teacher sees the parameters in place of the history
+            present = len(present_inputs(config, signals, actions))
+            matrix = (*matrix[:present], *matrix[len(names) :])
+            matrix = extended(matrix, len(names), parameters, parameters)
         kwargs["features_extractor_class"] = LinearFeatures
-        kwargs["features_extractor_kwargs"] = {"matrix": input_matrix(network, names)}
+        kwargs["features_extractor_kwargs"] = {"matrix": matrix}
     if config.algo not in ON_POLICY:
         return {"policy": "MlpPolicy", "policy_kwargs": kwargs}
     kwargs["log_std_init"] = network.log_std_init

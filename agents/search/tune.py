@@ -80,6 +80,11 @@ def search(job: Job, console: Console) -> optuna.Study:
         raise SettingsError(
             "evaluation.episodes = 0: a search needs episodes on tuning seeds; set it above 0"
         )
+    if job.config.adaptation.steps:
+        raise SettingsError(
+            "adaptation.steps > 0: a search evaluates PPO, not the student; search the preset "
+            "without adaptation, for example robust"
+        )
     study = open_study(job)
 
     def one(trial: optuna.Trial) -> float:

@@ -109,7 +109,9 @@ class TQC(_OffPolicy):
 class History:
     """Past signals as inputs: with hysteresis a single observation is not the full state."""
 
-    frames: int = number(0, 0, 256)  # past control periods, 0 for none
+    frames: int = number(0, 0, 256)  # past values of each signal, 0 for none
+    # control periods between them: the oldest value is frames * stride periods old
+    stride: int = number(1, 1, 256)
     signals: tuple[str, ...] = ()
 
 
@@ -136,6 +138,69 @@ class Plants:
 
     randomize: bool = False
     hysteresis: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Reward of the training, from the reward terms of the environment.
+
+    The environments cost an error linearly and the leaderboard scores its RMS. ``quadratic`` makes
+    the cost of each error quadratic up to that many of its scales and linear beyond (Huber), with
+    the environment's ``reward/ended`` scaled so that ending an episode still never pays.
+    """
+
+    quadratic: float = number(0.0, 0.0, 1e4)  # 0: linear everywhere, as in the environment
+    # cost of a change of the applied action over its whole range in one period; quadratic
+    action_rate: float = number(0.0, 0.0, 1e5)
+    # cost of each control period that a limit cut off, where the environment has no reward/ended
+    ended: float = number(0.0, 0.0, 1e5)
+
+
+@dataclass(frozen=True)
+class Privileged:
+    """Asymmetric actor-critic (Pinto et al., RSS 2018).
+
+    With ``critic``, the critic of PPO also sees the plant's parameters that differ among episodes,
+    normalised by their ranges, and the noise-free state; the actor and its file do not.
+    """
+
+    critic: bool = False
+
+
+@dataclass(frozen=True)
+class Widening:
+    """Automatic domain randomisation (Akkaya et al., arXiv:1910.07113).
+
+    Every drawn parameter starts with the share ``start`` of its range around the nominal value.
+    Where the mean cost of ``episodes`` episodes in the outer ``edge`` of the present range is at
+    most ``ratio`` times that of the rows with nominal plants, this end moves outwards by ``step``
+    of the declared range, up to its end. Ranges never narrow.
+    """
+
+    start: float = number(1.0, 0.01, 1.0)  # 1: the whole ranges from the beginning
+    step: float = number(0.1, 0.001, 1.0)
+    ratio: float = number(2.0, 0.1, 100.0)
+    episodes: int = number(32, 2, 1000)
+    edge: float = number(0.2, 0.01, 0.5)
+
+
+@dataclass(frozen=True)
+class Adaptation:
+    """Rapid motor adaptation (Kumar et al., RSS 2021), in the form of an imitated teacher.
+
+    The policy that PPO trains, the teacher, sees the plant's parameters that differ among episodes.
+    After that a student with the settings' history imitates its actions for ``steps`` control
+    periods on the states that the student visits (DAgger, Ross et al., AISTATS 2011), and is the
+    exported policy.
+    """
+
+    steps: int = number(0, 0, 10**12)  # 0: no teacher
+    n_steps: int = number(32, 1, 100_000)  # control periods of each row between updates
+    n_epochs: int = number(4, 1, 100)
+    batch_size: int = number(4096, 2, 1_000_000)
+    learning_rate: tuple[float, float] = number((1e-3, 5e-5), 0.0, 1.0)
+    # share of the steps in which some rows follow the teacher, from all rows to none
+    guided: float = number(0.2, 0.0, 1.0)
 
 
 @dataclass(frozen=True)

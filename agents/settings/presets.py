@@ -17,7 +17,19 @@ import gymnasium as gym
 
 import pam_envs  # noqa: F401  (registers the environments)
 from agents.settings import parts
-from agents.settings.parts import Evaluation, History, Network, Normalize, Plants, Residual, Search
+from agents.settings.parts import (
+    Adaptation,
+    Cost,
+    Evaluation,
+    History,
+    Network,
+    Normalize,
+    Plants,
+    Privileged,
+    Residual,
+    Search,
+    Widening,
+)
 from agents.settings.schema import SettingsError, build, choice, number
 from pam_envs import yaml_file
 from pam_envs.wording import near
@@ -25,7 +37,12 @@ from pam_envs.wording import near
 FOLDER = Path(__file__).resolve().parents[1] / "configs"
 ALGORITHMS: tuple[str, ...] = ("ppo", "sac", "tqc", "recurrent_ppo")
 ON_POLICY = ("ppo", "recurrent_ppo")
-OPTIONAL = ("share", "per_reference", "history", "residual", "plants", "evaluation", "search")
+MODEL = "model"
+"""Entry of ``mix`` with arguments of the controller's nominal plant."""
+OPTIONAL = (
+    *("share", "mix", "per_reference", "cost", "history", "residual", "plants", "widening"),
+    *("privileged", "adaptation", "evaluation", "search"),
+)
 """Parts that the plain form omits where they equal their defaults."""
 NAME = re.compile(r"[A-Za-z0-9]+-v[0-9]+\.[a-z_]+(-[a-z_]+)?")
 ENV = re.compile(r"PAM/[A-Za-z0-9]+-v[0-9]+")
@@ -38,10 +55,13 @@ class Config:
 
     ``steps`` and ``checkpoint_steps`` count control periods of all rows of the batched environment
     together. ``share`` has arguments of the environment that differ among the rows, each a list:
-    the rows are divided evenly among all combinations, the kinds of rows. ``per_reference`` has
-    further arguments by the kind's reference, for example reward weights that balance references
-    with small and with large errors. The parts are described in :mod:`agents.settings.parts`; of
-    those of the algorithms only that of ``algo`` is used. ``schema`` is the version of this schema.
+    the rows are divided evenly among all combinations, the kinds of rows. ``mix`` is a list of sets
+    of arguments, each of which is combined with all of these; in an entry, ``model`` has arguments
+    of the nominal plant from which a residual's controller is built, as in a scenario file.
+    ``per_reference`` has further arguments by the kind's reference, for example reward weights that
+    balance references with small and with large errors. The parts are described in
+    :mod:`agents.settings.parts`; of those of the algorithms only that of ``algo`` is used.
+    ``schema`` is the version of this schema.
     """
 
     env: str
@@ -51,12 +71,17 @@ class Config:
     checkpoint_steps: int = number(500_000, 1, 10**12)
     env_kwargs: dict[str, Any] = field(default_factory=dict)
     share: dict[str, Any] = field(default_factory=dict)
+    mix: tuple[dict[str, Any], ...] = ()
     per_reference: dict[str, Any] = field(default_factory=dict)
     network: Network = field(default_factory=Network)
     normalize: Normalize = field(default_factory=Normalize)
+    cost: Cost = field(default_factory=Cost)
     history: History = field(default_factory=History)
     residual: Residual = field(default_factory=Residual)
     plants: Plants = field(default_factory=Plants)
+    widening: Widening = field(default_factory=Widening)
+    privileged: Privileged = field(default_factory=Privileged)
+    adaptation: Adaptation = field(default_factory=Adaptation)
     evaluation: Evaluation = field(default_factory=Evaluation)
     search: Search = field(default_factory=Search)
     ppo: parts.PPO = field(default_factory=parts.PPO)
@@ -80,14 +105,43 @@ class Config:
             )
         if bool(self.history.frames) != bool(self.history.signals):
             raise SettingsError("history needs both frames and signals, or neither")
+        self._check_privileged()
         self._check_kinds()
+
+    def _check_privileged(self) -> None:
+        """Refuse settings that a privileged critic, a teacher or widening ranges do not fit."""
+        if not self.sees_parameters:
+            return
+        name = "privileged.critic" if self.privileged.critic else "adaptation.steps"
+        if self.adaptation.steps and (self.algo != "ppo" or not self.history.frames):
+            raise SettingsError("adaptation.steps needs algo: ppo and a history for the student")
+        if self.algo not in ON_POLICY or not self.network.linear:
+            raise SettingsError(f"{name} needs ppo or recurrent_ppo with network.linear: true")
+        if self.algo == "recurrent_ppo" and self.recurrent_ppo.critic_lstm:
+            raise SettingsError(f"{name} needs recurrent_ppo.critic_lstm: false")
+        if self.normalize.observation:
+            raise SettingsError(f"{name} needs normalize.observation: false")
+
+    @property
+    def sees_parameters(self) -> bool:
+        """Whether the critic, or a teacher, sees the plants' parameters in training."""
+        return self.privileged.critic or self.adaptation.steps > 0
 
     def _check_kinds(self) -> None:
         given = {"randomize", "hysteresis"} & {*self.env_kwargs, *self.share}
+        mixed = {name for entry in self.mix for name in entry}
         if self.plants != Plants() and given:
             raise SettingsError(
                 f"env_kwargs or share and plants both set {', '.join(sorted(given))}; keep plants"
             )
+        if "hysteresis" in mixed or ("randomize" in mixed and self.plants.randomize):
+            raise SettingsError(
+                "mix sets hysteresis, or randomize beside plants.randomize: true; leave hysteresis "
+                "to plants, and plants.randomize false"
+            )
+        for entry in self.mix:
+            if not isinstance(entry.get(MODEL, {}), Mapping):
+                raise SettingsError(f"mix: model = {entry[MODEL]!r} must be a mapping")
         for name, values in self.share.items():
             if not isinstance(values, list) or not values:
                 raise SettingsError(f"share.{name} = {values!r} must be a list of values")
@@ -99,18 +153,30 @@ class Config:
         kinds = len(self.kinds())
         if self.num_envs % kinds:
             raise SettingsError(
-                f"num_envs = {self.num_envs} is no multiple of the {kinds} kinds that share and "
-                "plants.hysteresis make; choose one"
+                f"num_envs = {self.num_envs} is no multiple of the {kinds} kinds that share, mix "
+                "and plants.hysteresis make; choose one"
             )
 
     def kinds(self) -> tuple[dict[str, Any], ...]:
         """Return the environment's arguments of each kind of rows."""
+        return tuple({k: v for k, v in kind.items() if k != MODEL} for kind in self._rows())
+
+    def models(self) -> tuple[dict[str, Any], ...]:
+        """Return the controller's arguments of each kind of rows, {} for the rows' nominal plant.
+
+        They are complete: those of the environment with the changes of ``model``.
+        """
+        kinds = zip(self.kinds(), self._rows(), strict=True)
+        return tuple({**kind, **row[MODEL]} if row.get(MODEL) else {} for kind, row in kinds)
+
+    def _rows(self) -> tuple[dict[str, Any], ...]:
         laws = {"hysteresis": list(self.plants.hysteresis)} if self.plants.hysteresis else {}
         shared = {**laws, **self.share}
         base = {**self.env_kwargs, **({"randomize": True} if self.plants.randomize else {})}
         kinds = [
-            {**base, **dict(zip(shared, values, strict=True))}
+            {**base, **dict(zip(shared, values, strict=True)), **entry}
             for values in itertools.product(*shared.values())
+            for entry in self.mix or ({},)
         ]
         own = self.per_reference
         return tuple({**kind, **own.get(str(kind.get("reference")), {})} for kind in kinds)

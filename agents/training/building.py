@@ -9,14 +9,18 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
-from agents.export.export import ALGORITHMS
+from agents.export.export import ALGORITHMS, layer
 from agents.policies.networks import kept_inputs, policy_arguments, silence
 from agents.settings import seeds
+from agents.settings.parts import Cost, Widening
 from agents.settings.presets import ON_POLICY, Config
 from agents.settings.schema import SettingsError
-from agents.vec_envs.batch import make_batch_vec_env
+from agents.vec_envs.batch import make_batch_vec_env, nominal_plant
+from agents.vec_envs.cost import CostVecEnv
 from agents.vec_envs.history import HistoryVecEnv
+from agents.vec_envs.privileged import PrivilegedVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
+from agents.vec_envs.widening import WideningVecEnv
 from baselines.core.catalogue import CONTROLLERS, make_controller
 from pam_envs.wording import near
 
@@ -25,20 +29,29 @@ OWN = ("learning_rate", "lstm_size", "critic_lstm", "warm_up")
 
 
 def make_env(config: Config) -> VecEnv:
-    """Return the environment of a run: batch, monitor, controller, history, normaliser."""
+    """Return the environment of a run: the batch and its wrappers, the normaliser outermost."""
     corrected, scale = config.residual.controller, config.residual.scale
     if corrected and corrected not in CONTROLLERS:
         hint = near(corrected, [*CONTROLLERS])
         raise SettingsError(f"residual.controller = {corrected!r} is not known{hint}")
     kinds = config.kinds()
     rows = config.num_envs // len(kinds)
-    env: VecEnv = VecMonitor(make_batch_vec_env(config.env, rows, *kinds))
+    env: VecEnv = make_batch_vec_env(config.env, rows, *kinds)
     signals, actions = signals_of(env)
+    if config.cost != Cost():
+        env = CostVecEnv(env, config.cost)
+    env = VecMonitor(env)
+    if config.widening != Widening():
+        env = WideningVecEnv(env, config.widening)
     if corrected:
         made = partial(make_controller, corrected, signals=signals, action_signals=actions)
-        env = ResidualVecEnv(env, corrected, made, scale)
+        env = ResidualVecEnv(env, corrected, made, scale, controller_plants(config, env))
     if config.history.frames:
-        env = HistoryVecEnv(env, kept_inputs(config, signals, actions), config.history.frames)
+        past = config.history
+        kept = kept_inputs(config, signals, actions)
+        env = HistoryVecEnv(env, kept, past.frames, past.stride)
+    if config.sees_parameters:
+        env = PrivilegedVecEnv(env)
     normalize = config.normalize
     if not (normalize.observation or normalize.reward):
         return env
@@ -52,12 +65,23 @@ def make_env(config: Config) -> VecEnv:
     )
 
 
+def controller_plants(config: Config, env: VecEnv) -> list[Any]:
+    """Return the nominal plant of the corrected controller, one for each batch of rows."""
+    batches: Any = env.unwrapped
+    return [
+        nominal_plant(config.env, model) if model else batch.unwrapped.plant
+        for batch, model in zip(batches.batches, config.models(), strict=True)
+    ]
+
+
 def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
     """Return the untrained model of a run, with all random generators seeded."""
     torch.set_num_threads(1)
     random.seed(seed)
     arguments = {k: v for k, v in vars(config.chosen).items() if k not in OWN}
-    arguments |= policy_arguments(config, *signals_of(env))
+    hidden = layer(env, PrivilegedVecEnv)
+    widths = (0, 0) if hidden is None else (len(hidden.names), len(hidden.states))
+    arguments |= policy_arguments(config, *signals_of(env), widths)
     rate = learning_rate(config)
     made = ALGORITHMS[config.algo]
     model = made(env=env, learning_rate=rate, seed=seed, device="cpu", **arguments)

@@ -17,6 +17,7 @@ from agents.policies.policy import OnnxPolicy
 from agents.policies.residual import with_controller
 from agents.settings import seeds
 from agents.settings.presets import Config
+from agents.vec_envs.batch import nominal_plant
 from baselines.core.catalogue import make_controller
 
 TRAVEL = "effort/pressure_travel"
@@ -79,7 +80,8 @@ def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = No
     kinds = config.kinds()
     chosen = seeds.tuning(max(count // len(kinds), 1))
     parts = [
-        _Part(policy, config, {**kind, **config.evaluation.env_kwargs}, chosen) for kind in kinds
+        _Part(policy, config, {**kind, **config.evaluation.env_kwargs}, model, chosen)
+        for kind, model in zip(kinds, config.models(), strict=True)
     ]
     counted = sum(part.counted for part in parts)
     squares = sum(part.squares for part in parts)
@@ -93,19 +95,28 @@ def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = No
 
 
 class _Part:
-    """The episodes of one kind of rows, as one batch, with sums over the evaluated instants."""
+    """The episodes of one kind of rows, as one batch, with sums over the evaluated instants.
+
+    The controller is built from the nominal plant of ``model``, or of the rows.
+    """
 
     def __init__(
-        self, policy: OnnxPolicy | str, config: Config, kwargs: dict[str, Any], chosen: list[int]
+        self,
+        policy: OnnxPolicy | str,
+        config: Config,
+        kwargs: dict[str, Any],
+        model: dict[str, Any],
+        chosen: list[int],
     ) -> None:
         env: Any = gym.make_vec(
             config.env, len(chosen), vectorization_mode="vector_entry_point", **kwargs
         )
         base: Any = env.unwrapped
+        plant = nominal_plant(config.env, model) if model else base.plant
         controller: Any = (
-            make_controller(policy, base.plant, base.signals, base.action_signals)
+            make_controller(policy, plant, base.signals, base.action_signals)
             if isinstance(policy, str)
-            else with_controller(policy, base.plant)
+            else with_controller(policy, plant)
         )
         self.evaluation = config.evaluation
         self.returns = np.zeros(len(chosen))

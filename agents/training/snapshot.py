@@ -19,8 +19,11 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 from agents.training.checkpoint import tensors
+from agents.vec_envs.cost import CostVecEnv
 from agents.vec_envs.history import HistoryVecEnv
+from agents.vec_envs.privileged import PrivilegedVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
+from agents.vec_envs.widening import WideningVecEnv
 from pam_envs.wording import shown
 
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
@@ -29,8 +32,11 @@ ARRAYS: dict[type[VecEnv], tuple[str, ...]] = {
     VecMonitor: ("episode_returns", "episode_lengths"),
     VecNormalize: ("returns", "old_obs", "old_reward"),
     HistoryVecEnv: ("past", "last"),
+    CostVecEnv: ("before", "started"),
 }
 """Arrays of the wrappers' states."""
+OWN = (ResidualVecEnv, WideningVecEnv, PrivilegedVecEnv)
+"""Wrappers with a snapshot of their own."""
 ADAM = {"step", "exp_avg", "exp_avg_sq"}
 """State of a parameter in the optimiser of every algorithm."""
 BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
@@ -202,13 +208,13 @@ def _lstm(model: BaseAlgorithm) -> tuple[Any, ...]:
 def _layers(env: VecEnv) -> Iterator[VecEnv]:
     """Yield the wrappers with a state."""
     while hasattr(env, "venv"):
-        if isinstance(env, (ResidualVecEnv, *ARRAYS)):
+        if isinstance(env, (*OWN, *ARRAYS)):
             yield env
         env = env.venv
 
 
 def _layer(layer: VecEnv) -> dict[str, Any]:
-    if isinstance(layer, ResidualVecEnv):
+    if isinstance(layer, OWN):
         return layer.snapshot()
     made: dict[str, Any] = {n: np.array(getattr(layer, n)) for n in ARRAYS[type(layer)]}
     for name, moments in _moments(layer):
@@ -219,7 +225,7 @@ def _layer(layer: VecEnv) -> dict[str, Any]:
 
 
 def _restore_layer(layer: VecEnv, saved: dict[str, Any]) -> None:
-    if isinstance(layer, ResidualVecEnv):
+    if isinstance(layer, OWN):
         layer.restore(saved)
         return
     for name in ARRAYS[type(layer)]:

@@ -11,6 +11,7 @@ processor. Torch uses one thread, since sums depend on the number of threads. On
 differs: it holds the steps between the last checkpoint and the kill twice.
 """
 
+import dataclasses
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,15 +24,17 @@ from rich.console import Console
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
 
-from agents.export.export import export_policy, facts, plants_of
+from agents.export.export import export_policy, facts, layer, plants_of
 from agents.policies.policy_file import POLICY, finished
 from agents.settings import presets as configs
-from agents.training import callbacks, checkpoint, snapshot
+from agents.settings.parts import Evaluation
+from agents.training import adaptation, callbacks, checkpoint, snapshot
 from agents.training.best import Best
 from agents.training.building import make_env, make_model
 from agents.training.callbacks import Checkpoints, Evaluations
 from agents.training.checkpoint import CheckpointError
 from agents.training.record import CHECKPOINT, LOCK, Clock, Run, cost
+from agents.vec_envs.widening import WideningVecEnv
 from sweeps.progress import progress
 
 
@@ -141,15 +144,37 @@ def _train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
             )
         evaluations.last()
         checkpoints.act()
+    card: dict[str, Any] = {"seed": run.seed, "command": run.command()}
+    card["config"] = run.config.as_dict()
+    ranges = layer(model.get_env(), WideningVecEnv)
+    if run.config.adaptation.steps:
+        model, evaluations, card["imitation_error"] = _adapted(run, model, console)
     model.logger.close()
-    card = {"seed": run.seed, "command": run.command(), "config": run.config.as_dict()}
     if evaluations.found:
         card["evaluation"] = evaluations.found
         card["chosen"] = evaluations.best.chosen(len(evaluations.found))
         evaluations.best.restore(model)
     record = cost(run, clock.spent(), model.num_timesteps)
+    if ranges is not None:
+        record["ranges"] = ranges.ranges()
     export_policy(model, run.folder / POLICY, card, record)
     return run.folder / POLICY
+
+
+def _adapted(
+    run: Run, teacher: BaseAlgorithm, console: Console
+) -> tuple[BaseAlgorithm, Evaluations, list[float]]:
+    """Return the student of a trained teacher, its evaluations and its errors while it learned."""
+    settings = run.config.adaptation
+    student = adaptation.untrained(teacher, run.config, run.seed)
+    evaluations = Evaluations(run.config, [], Best())
+    evaluations.init_callback(student)
+    evaluations.last()
+    with progress("steps of the student", console) as begin:
+        advance = begin(settings.steps)
+        errors = adaptation.learn(student, teacher, settings, run.seed, advance)
+    evaluations.last()
+    return student, evaluations, errors
 
 
 def train_to_the_end(run: Run, console: Console) -> Path:
@@ -165,9 +190,15 @@ def train_to_the_end(run: Run, console: Console) -> Path:
 
 
 def _so_far(run: Run, model: BaseAlgorithm) -> tuple[Clock, Evaluations]:
-    """Return the time spent and the evaluations recorded up to the checkpoint."""
+    """Return the time spent and the evaluations recorded up to the checkpoint.
+
+    A teacher is not evaluated: its file would assume the nominal plant.
+    """
+    config = run.config
+    if config.adaptation.steps:
+        config = dataclasses.replace(config, evaluation=Evaluation())
     if not model.num_timesteps:
-        return Clock(), Evaluations(run.config, [], Best())
+        return Clock(), Evaluations(config, [], Best())
     content = checkpoint.load(run.checkpoint)
     try:
         spent, best = content["spent"], Best(**content["best"])
@@ -175,7 +206,7 @@ def _so_far(run: Run, model: BaseAlgorithm) -> tuple[Clock, Evaluations]:
         if best.steps >= 0:
             snapshot.check(best.weights, checkpoint.tensors(model.policy.state_dict()), "best")
         best.moments = {name: moment.numpy() for name, moment in best.moments.items()}
-        evaluations = Evaluations(run.config, list(content["evaluations"]), best)
+        evaluations = Evaluations(config, list(content["evaluations"]), best)
         return Clock(spent["wall"], spent["cpu"]), evaluations
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise CheckpointError(f"{run.checkpoint.name} lacks its evaluations: {error}") from error

@@ -38,6 +38,12 @@ def make_batch_vec_env(env_id: str, num_envs: int, *kinds: Mapping[str, Any], **
     )
 
 
+def nominal_plant(env_id: str, arguments: Mapping[str, Any]) -> Any:
+    """Return the nominal plant of an environment with these arguments."""
+    made: Any = gym.make_vec(env_id, 1, vectorization_mode="vector_entry_point", **arguments)
+    return made.unwrapped.plant
+
+
 class BatchVecEnv(VecEnv):
     """``VecEnv`` over the rows of batched Gymnasium environments, one batch after the other.
 
@@ -45,6 +51,10 @@ class BatchVecEnv(VecEnv):
     ``i`` after ``seed(s)`` is the single environment reset with ``s + i``, bit for bit.
     ``infos[i]`` is empty unless an episode ended in row ``i``; then it holds
     ``terminal_observation`` and ``TimeLimit.truncated``.
+
+    ``present`` and ``last`` hold the entries of ``info`` named by :meth:`watch`, shape (num_envs,)
+    each. They differ in rows whose episode has just ended: ``last`` has its last values,
+    ``present`` those of the next episode.
     """
 
     def __init__(self, *batches: VectorEnv[Any, Any, Any]) -> None:
@@ -61,13 +71,21 @@ class BatchVecEnv(VecEnv):
         self.slices = tuple(slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
         self.spec = batches[0].spec
         self._actions: NDArray[Any] | None = None
+        self._watched: tuple[str, ...] = ()
+        self._by_row = all(getattr(batch.unwrapped, "with_info", True) for batch in batches)
+        self.present: dict[str, NDArray[Any]] = {}
+        self.last: dict[str, NDArray[Any]] = {}
         super().__init__(
             ends[-1], batches[0].single_observation_space, batches[0].single_action_space
         )
 
-    def parts(self) -> Iterator[tuple[slice, Any]]:
-        """Yield the rows of each plant; adjacent batches of equal plants are one entry."""
-        plants = [(rows, self._base(i).plant) for i, rows in enumerate(self.slices)]
+    def parts(self, plants: Sequence[Any] = ()) -> Iterator[tuple[slice, Any]]:
+        """Yield the rows of each plant; adjacent batches of equal plants are one entry.
+
+        ``plants`` replaces the nominal plants of the batches, one for each.
+        """
+        own = plants or [self._base(i).plant for i in range(len(self.batches))]
+        plants = list(zip(self.slices, own, strict=True))
         for _, group in itertools.groupby(plants, key=lambda pair: pair[1].digest()):
             pairs = list(group)
             yield slice(pairs[0][0].start, pairs[-1][0].stop), pairs[0][1]
@@ -80,18 +98,49 @@ class BatchVecEnv(VecEnv):
         made = [
             self._reset(batch, rows) for batch, rows in zip(self.batches, self.slices, strict=True)
         ]
-        self.reset_infos = [info for _, infos in made for info in infos]
+        self._keep([infos for _, infos in made])
+        pairs = zip(made, self.batches, strict=True)
+        self.reset_infos = [
+            info
+            for (_, infos), batch in pairs
+            for info in _rows_of(infos if self._by_row else {}, batch.num_envs)
+        ]
         self._reset_seeds()
         self._reset_options()
         return _joined([observation for observation, _ in made])
 
-    def _reset(self, batch: Any, rows: slice) -> tuple[Any, list[dict[str, Any]]]:
+    def _reset(self, batch: Any, rows: slice) -> tuple[Any, dict[str, Any]]:
         seeds, options = self._seeds[rows], self._options[rows]
         if any(own != options[0] for own in options):
             raise ValueError("the rows are reset by one call; give the same options for all rows")
         seeded = any(seed is not None for seed in seeds)
-        observation, infos = batch.reset(seed=seeds if seeded else None, options=options[0] or None)
-        return observation, _rows_of(infos, batch.num_envs)
+        return batch.reset(seed=seeds if seeded else None, options=options[0] or None)  # type: ignore[no-any-return]
+
+    def watch(self, names: Sequence[str]) -> None:
+        """Report entries of ``info`` in ``present`` and ``last`` from the next step or reset on."""
+        self._watched = tuple(dict.fromkeys((*self._watched, *names)))
+        for i in range(len(self.batches)):
+            self._base(i).with_info = True
+
+    def reported(self) -> tuple[str, ...]:
+        """Return the names of all entries of ``info``."""
+        return tuple(self._base(0).setup.info_keys)
+
+    def parameters(self) -> NDArray[np.float64]:
+        """Return the parameters [SI] of the present episodes, as in ``plant.names``."""
+        return _joined([self._base(i).parameters() for i in range(len(self.batches))])
+
+    def _keep(self, infos: Sequence[Mapping[str, Any]]) -> None:
+        """Keep the watched entries of a step's or reset's infos, one of each batch."""
+        for name in self._watched:
+            self.present[name] = _joined([np.asarray(info[name]) for info in infos])
+            ends = [
+                np.where(info["_final_info"], info["final_info"][name], info[name])
+                if "final_info" in info
+                else np.asarray(info[name])
+                for info in infos
+            ]
+            self.last[name] = _joined(ends)
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions for :meth:`step_wait`."""
@@ -103,12 +152,17 @@ class BatchVecEnv(VecEnv):
             raise RuntimeError("call step_async(actions) before step_wait()")
         actions, self._actions = self._actions, None
         made = [
-            _stepped(batch, actions[rows])
-            for batch, rows in zip(self.batches, self.slices, strict=True)
+            batch.step(actions[rows]) for batch, rows in zip(self.batches, self.slices, strict=True)
         ]
-        observations, rewards, done, infos = zip(*made, strict=True)
-        rows = [info for batch in infos for info in batch]
-        return _joined(observations), _joined(rewards), _joined(done), rows
+        observations, rewards, terminated, truncated, infos = zip(*made, strict=True)
+        self._keep(infos)
+        rows = [
+            info
+            for t, u, reported in zip(terminated, truncated, infos, strict=True)
+            for info in _step_infos(reported, t, u, self._by_row)
+        ]
+        done = _joined(terminated) | _joined(truncated)
+        return _joined(observations), _joined(rewards).astype(np.float32), done, rows
 
     def close(self) -> None:
         """Close all batches."""
@@ -182,14 +236,14 @@ def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return np.asarray(arrays[0]) if len(arrays) == 1 else np.concatenate(arrays)
 
 
-def _stepped(batch: Any, actions: NDArray[Any]) -> tuple[Any, Any, Any, list[dict[str, Any]]]:
-    """Return observations, rewards, ends and infos of the rows of a batch after a step."""
-    observation, reward, terminated, truncated, infos = batch.step(actions)
-    done = terminated | truncated
-    rows = _rows_of(infos, batch.num_envs)
-    for i in np.flatnonzero(done).tolist():
-        rows[i] = _last_info(infos, i, bool(truncated[i] and not terminated[i]))
-    return observation, reward.astype(np.float32), done, rows
+def _step_infos(
+    infos: Mapping[str, Any], terminated: NDArray[Any], truncated: NDArray[Any], by_row: bool
+) -> list[dict[str, Any]]:
+    """Return the infos of a batch's step by row; only those of ended episodes unless ``by_row``."""
+    rows = _rows_of(infos if by_row else {}, len(terminated))
+    for i in np.flatnonzero(terminated | truncated).tolist():
+        rows[i] = _last_info(infos, i, bool(truncated[i] and not terminated[i]), by_row)
+    return rows
 
 
 def _rows_of(infos: Mapping[str, Any], rows: int) -> list[dict[str, Any]]:
@@ -201,8 +255,8 @@ def _rows_of(infos: Mapping[str, Any], rows: int) -> list[dict[str, Any]]:
     return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
-def _last_info(infos: Mapping[str, Any], row: int, truncated: bool) -> dict[str, Any]:
-    last = infos.get("final_info", {})
+def _last_info(infos: Mapping[str, Any], row: int, truncated: bool, by_row: bool) -> dict[str, Any]:
+    last = infos.get("final_info", {}) if by_row else {}
     made = {k: v[row].item() for k, v in last.items() if not k.startswith("_")}
     made["terminal_observation"] = infos["final_obs"][row]
     made["TimeLimit.truncated"] = truncated

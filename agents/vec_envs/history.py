@@ -1,4 +1,4 @@
-"""Environment whose observation includes signals of the last control periods."""
+"""Environment whose observation includes past signals."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,33 +11,47 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 
 class HistoryVecEnv(VecEnvWrapper):
-    """Append past values of some columns, the latest first; at reset they equal the present."""
+    """Append ``frames`` past values of some columns, ``stride`` control periods apart.
 
-    def __init__(self, venv: VecEnv, columns: Sequence[int], frames: int) -> None:
+    The latest comes first; at reset they equal the present.
+    """
+
+    def __init__(self, venv: VecEnv, columns: Sequence[int], frames: int, stride: int = 1) -> None:
         self.columns = list(columns)
-        self.frames = frames
+        self.frames, self.stride = frames, stride
         box: Any = venv.observation_space
         low, high = (np.concatenate([v, *[v[self.columns]] * frames]) for v in (box.low, box.high))
         super().__init__(venv, spaces.Box(low, high, dtype=np.float32))
-        self.past = np.zeros((venv.num_envs, frames * len(self.columns)), np.float32)
+        # every past period; frame k of the observation is the one k * stride periods ago
+        self.past = np.zeros((venv.num_envs, frames * stride * len(self.columns)), np.float32)
         self.last = np.zeros((venv.num_envs, len(self.columns)), np.float32)
+        self.shown = shown_columns(len(self.columns), frames, stride)
 
     def reset(self) -> NDArray[np.float32]:
         """Start all episodes; see stable-baselines3."""
         observation = np.asarray(self.venv.reset())
         self.last = observation[:, self.columns]
-        self.past = np.tile(self.last, self.frames)
-        return np.concatenate([observation, self.past], 1)
+        self.past = np.tile(self.last, self.frames * self.stride)
+        return self._joined(observation, self.past)
+
+    def _joined(self, observation: NDArray[Any], past: NDArray[Any]) -> NDArray[np.float32]:
+        return np.concatenate([observation, past[..., self.shown]], -1)
 
     def step_wait(self) -> VecEnvStepReturn:
         """Step all rows; see stable-baselines3."""
         raw, reward, done, infos = self.venv.step_wait()
         observation = np.asarray(raw)
-        kept = len(self.columns) * (self.frames - 1)
+        kept = self.past.shape[1] - len(self.columns)
         self.past = np.concatenate([self.last, self.past[:, :kept]], 1)
         self.last = observation[:, self.columns]
         for row in np.flatnonzero(done).tolist():
             ended = infos[row]["terminal_observation"]
-            infos[row]["terminal_observation"] = np.concatenate([ended, self.past[row]])
-            self.past[row] = np.tile(self.last[row], self.frames)
-        return np.concatenate([observation, self.past], 1), reward, done, infos
+            infos[row]["terminal_observation"] = self._joined(ended, self.past[row])
+            self.past[row] = np.tile(self.last[row], self.frames * self.stride)
+        return self._joined(observation, self.past), reward, done, infos
+
+
+def shown_columns(columns: int, frames: int, stride: int) -> list[int]:
+    """Return the places, among the values of every past period, of those in the observation."""
+    starts = [(k * stride - 1) * columns for k in range(1, frames + 1)]
+    return [start + i for start in starts for i in range(columns)]

@@ -1,6 +1,6 @@
 """Environment of a residual policy, whose action corrects a controller's."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,12 +17,20 @@ class ResidualVecEnv(VecEnvWrapper):
 
     The controller, which ``make`` makes from a nominal plant, runs on all rows at once, with a
     state for each, and its action is appended to the observation; rows on different plants have a
-    controller each. The actions of ``venv`` are in [-1, 1]; ``scale`` is that of
+    controller each. ``plants``, one for each batch of rows, replaces their nominal plants. The
+    actions of ``venv`` are in [-1, 1]; ``scale`` is that of
     :class:`agents.settings.parts.Residual`; ``record`` is the card's entry on the controller, once
     it is recorded.
     """
 
-    def __init__(self, venv: VecEnv, name: str, make: Callable[[Any], Any], scale: float) -> None:
+    def __init__(
+        self,
+        venv: VecEnv,
+        name: str,
+        make: Callable[[Any], Any],
+        scale: float,
+        plants: Sequence[Any] = (),
+    ) -> None:
         box, action = venv.observation_space, venv.action_space
         assert isinstance(box, spaces.Box)
         assert isinstance(action, spaces.Box)
@@ -42,7 +50,9 @@ class ResidualVecEnv(VecEnvWrapper):
         self.name = name
         self.range = action
         self.scale = np.float32(scale)
-        self.controllers = [(rows, make(plant)) for rows, plant in parts_of(venv)]
+        parts = parts_of(venv, plants)
+        self.plants = [plant for _, plant in parts]
+        self.controllers = [(rows, make(plant)) for rows, plant in parts]
         self.record: dict[str, Any] | None = None
         self.states: list[Any] = [None] * len(self.controllers)
         self.given = np.zeros((venv.num_envs, width), np.float32)
@@ -106,10 +116,10 @@ class ResidualVecEnv(VecEnvWrapper):
             self.states[i] = _restored(template, saved["states"][i])
 
 
-def parts_of(venv: VecEnv) -> list[tuple[slice, Any]]:
-    """Return the rows of each nominal plant."""
+def parts_of(venv: VecEnv, plants: Sequence[Any] = ()) -> list[tuple[slice, Any]]:
+    """Return the rows of each nominal plant, or of each of the given ones."""
     base: Any = venv.unwrapped
-    return list(base.parts())
+    return list(base.parts(plants))
 
 
 # A controller's state is a tuple, perhaps named, of arrays, None and such tuples.

@@ -17,8 +17,9 @@ def of_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> dict[st
 
     A policy knows the plants of its training, named on its card; a residual one is built from the
     nominal model as well. ``trained_on_plant`` is true of a policy only where its nominal model is
-    another plant. With drawn plants it means that the training drew them as well, or was on the
-    plant that they are drawn around where the model is another.
+    another plant, or with drawn plants another than that which they are drawn around. Training with
+    parameters drawn in their declared ranges is no such knowledge: the ranges are public, and
+    classical controllers may be tuned on drawn plants as well.
     """
     base, card = env.unwrapped, getattr(controller, "card", None)
     plant, drawn = base.plant.digest(), base.setup.drawn
@@ -30,7 +31,7 @@ def of_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> dict[st
     varied = bool((card.get("env_kwargs") or {}).get("randomize"))
     met = plant in card.get("plants", [card.get("plant")])
     knows = (entrant.kind == "learned" or same) and met and not varied and not drawn
-    return {"knows_plant": knows, "trained_on_plant": (varied and drawn) or (met and not same)}
+    return {"knows_plant": knows, "trained_on_plant": met and not same}
 
 
 def is_informed(entrant: Entrant) -> bool:

@@ -88,6 +88,20 @@ class Setup:
             low[:, int(row)], high[:, int(row)] = least - slack, most + slack
         return low, high
 
+    def parameter_hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the smallest and the largest value of each parameter, as in ``plant.names``.
+
+        Over the equally good fits and the ranges of drawn parameters, and the nominal value of
+        these; shape (n_parameters,) each.
+        """
+        settings, choices = self.shared[2:]
+        first = choices[CHOICE.at_members]
+        members = settings[first : first + choices[CHOICE.members], : len(self.plant.names)]
+        low, high = members.min(axis=0), members.max(axis=0)
+        for row, least, most in settings[choices[CHOICE.at_spread] :][: choices[CHOICE.spread], :3]:
+            low[int(row)], high[int(row)] = min(low[int(row)], least), max(high[int(row)], most)
+        return low, high
+
     def state(self, tiles: int, lanes: int) -> tuple[NDArray[Any], ...]:
         """Return zeroed state, parameters, integers and previews for tiles of ``lanes`` lanes."""
         return (

@@ -1,6 +1,8 @@
 """The batch of environments: the same step over rows, in tiles of lanes and over cores."""
 
+import dataclasses
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -26,6 +28,7 @@ from pam_envs.envs.core.setup import (
     for_kernels,
     tiles_for,
 )
+from pam_envs.envs.core.step import CHOICE
 from pam_envs.kernels.build import COMPILED, LANES
 from pam_envs.kernels.random import seed_words
 
@@ -99,6 +102,7 @@ class PlantVectorEnv(Batch):
         self._all = tuple(for_kernels(a) for a in setup.state(tiles_for(num_envs), LANES))
         self._shared = tuple(for_kernels(a) for a in setup.shared)
         self._keys = len(setup.info_keys)
+        self.hull = setup.parameter_hull()
         spread_out = COMPILED and threads != 1 and num_envs >= PARALLEL_FROM
         self._parallel = spread_out
         self._kernel = setup.kernels.parallel if spread_out else setup.kernels.batch
@@ -258,6 +262,52 @@ class PlantVectorEnv(Batch):
     def close_extras(self, **kwargs: Any) -> None:
         """Discard the pictures."""
         self._renderers = []
+
+    def parameters(self) -> NDArray[np.float64]:
+        """Return the parameters [SI] of the present episodes, shape (num_envs, n_parameters).
+
+        The columns are those of ``plant.names``. They include drawn values, which a controller does
+        not know.
+        """
+        fixed = np.asarray(self._all[1], np.float64)[:, : len(self.plant.names)]
+        lanes = np.moveaxis(fixed, 1, 2).reshape(-1, fixed.shape[1])
+        return (
+            lanes[: self.num_envs] if self.setup.drawn else np.repeat(lanes[:1], self.num_envs, 0)
+        )
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Ranges [SI] in which episodes draw parameters, by name."""
+        settings, choices = self.setup.shared[2:]
+        table = settings[choices[CHOICE.at_spread] :][: choices[CHOICE.spread], :3].tolist()
+        return {self.plant.names[int(row)]: (low, high) for row, low, high in table}
+
+    @ranges.setter
+    def ranges(self, ranges: Mapping[str, tuple[float, float]]) -> None:
+        """Draw parameters in other ranges, from each row's next episode on.
+
+        They replace those of ``randomize`` and must be within their hull with the nominal values,
+        for which stability was checked.
+        """
+        tables, samples, settings, choices = self.setup.shared
+        changed, names = settings.copy(), list(self.plant.names)
+        rows = changed[choices[CHOICE.at_spread] :][: choices[CHOICE.spread]]
+        if set(ranges) != set(self.ranges):
+            raise ValueError(
+                f"ranges of {', '.join(sorted(ranges)) or 'nothing'}; give one for each of "
+                f"{', '.join(self.ranges) or 'nothing, with randomize = False'}"
+            )
+        for row in rows:
+            name, (least, most) = names[int(row[0])], (end[int(row[0])] for end in self.hull)
+            low, high = ranges[name]
+            if not least <= low <= high <= most:
+                raise ValueError(
+                    f"the range of {name} is {low:g} to {high:g}; it must be ascending and within "
+                    f"{least:g} to {most:g}"
+                )
+            row[1:3] = low, high
+        self.setup = dataclasses.replace(self.setup, shared=(tables, samples, changed, choices))
+        self._shared = tuple(for_kernels(a) for a in self.setup.shared)
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """Return the complete state of the batch, as arrays that own their data."""

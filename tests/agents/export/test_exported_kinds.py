@@ -13,18 +13,21 @@ import pytest
 from short_runs import ID, KINDS, kind, tiny
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from agents.export.export import facts, policy_bytes
+from agents.export.export import facts, layer, policy_bytes
 from agents.policies.policy import OnnxPolicy
 from agents.policies.residual import with_controller
 from agents.settings import presets as configs
 from agents.settings.schema import SettingsError
 from agents.training import evaluation
 from agents.training.building import make_env, signals_of
-from agents.vec_envs.residual import parts_of
+from agents.vec_envs.residual import ResidualVecEnv, parts_of
 from baselines.core.catalogue import make_controller
 
 Run = Callable[[str], tuple[Any, Path]]
-REMEMBERS = ("recurrent", "plain_recurrent", "history", "residual_sac", "residual_recurrent")
+REMEMBERS = (
+    *("recurrent", "plain_recurrent", "history", "residual_sac", "residual_recurrent"),
+    *("strided", "privileged_recurrent"),
+)
 CORRECTS = ("residual", "residual_sac", "residual_recurrent")
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -221,6 +224,48 @@ def test_history_holds_past_signals_of_the_episode():
         last = infos[0]["terminal_observation"]
         assert np.array_equal(last[part], seen[ended_at - back][0, columns])
     assert np.array_equal(seen[-1][0, width:], np.tile(seen[-1][0, columns], 3))
+
+
+def test_history_with_a_stride_holds_every_third_period():
+    env = make_env(kind("strided", normalize={"reward": False}))
+    names = list(signals_of(env)[0].names())
+    columns = [names.index("contraction"), names.index("pressure")]
+    env.seed(5)
+    rng = np.random.default_rng(0)
+    seen = [env.reset()]
+    for _ in range(20):
+        seen.append(env.step(rng.uniform(-1, 1, (8, 1)).astype(np.float32))[0])
+    width = len(names)
+    assert seen[0].shape[1] == width + 4
+    for now in (1, 7, 20):
+        for k, back in enumerate((3, 6)):
+            part = seen[now][:, width + 2 * k : width + 2 * (k + 1)]
+            assert np.array_equal(part, seen[max(now - back, 0)][:, columns])
+
+
+def test_controllers_of_rows_with_a_wrong_model_know_another_plant():
+    entry = {"model": {"hysteresis": "maxwell_slip"}}
+    look = {"episodes": 4, "settle_seconds": 0.1}
+    plants = {"hysteresis": ["preisach"]}
+    config = kind("residual", plants=plants, mix=[{}, entry], evaluation=look)
+    env = make_env(config)
+    wrapper: Any = layer(env, ResidualVecEnv)
+    laws = [
+        gym.make(ID, hysteresis=law).unwrapped.plant.digest()
+        for law in ("preisach", "maxwell_slip")
+    ]
+    assert [plant.digest() for plant in wrapper.plants] == laws
+    assert [rows for rows, _ in wrapper.controllers] == [slice(0, 4), slice(4, 8)]
+    assert [plant.digest() for _, plant in env.unwrapped.parts()] == laws[:1]
+    for i, kwargs in enumerate(config.models()):
+        assert kwargs.get("hysteresis") == (None, "maxwell_slip")[i]
+        assert "model" not in config.kinds()[i]
+    right, wrong = evaluation.evaluate("inverse", config).kinds
+    assert (
+        right
+        == evaluation.evaluate("inverse", kind("residual", plants=plants, evaluation=look), 2).rms
+    )
+    assert wrong != right
 
 
 def test_kinds_of_plants_share_the_rows():

@@ -6,9 +6,12 @@ import gymnasium as gym
 import pytest
 
 from agents.settings import presets as configs
+from baselines.core.catalogue import CONTROLLERS
 
 PRESETS = sorted(configs.presets())
 RESIDUAL = [names for names in PRESETS if names[2].startswith("residual")]
+ROBUST = [names for names in PRESETS if names[1:] == ("ppo", "robust")]
+GAIT = ("PAM/KneeWalk", "PAM/KneeStairs")
 EVERY = [("ppo", ""), ("ppo", "residual")]
 
 
@@ -36,6 +39,28 @@ def test_environment_of_every_kind_of_row_exists(names):
     for kind in config.kinds():
         gym.make(config.env, **kind).close()
         gym.make(config.env, **{**kind, **config.evaluation.env_kwargs}).close()
+
+
+@pytest.mark.parametrize("names", ROBUST, ids="-".join)
+def test_robust_presets_have_drawn_everyday_and_a_quarter_of_nominal_plants(names):
+    config = configs.preset(*names)
+    drawn = [kind.get("randomize", False) for kind in config.kinds()]
+    assert drawn.count(False) >= len(drawn) / 4
+    assert {True, "everyday"} <= set(drawn)
+    assert config.cost.quadratic > 0.0
+    assert config.cost.action_rate > 0.0
+    assert config.privileged.critic
+    for kind in config.kinds()[: len(config.mix)]:
+        made = gym.make_vec(config.env, 1, vectorization_mode="vector_entry_point", **kind)
+        assert bool(made.unwrapped.ranges) == bool(kind.get("randomize"))
+
+
+@pytest.mark.parametrize("names", ROBUST, ids="-".join)
+def test_robust_residuals_correct_a_feedback_controller(names):
+    config = configs.preset(*names)
+    if not names[0].startswith(GAIT):
+        assert CONTROLLERS[config.residual.controller].feedback
+        assert config.residual.scale * math.exp(config.network.log_std_init) <= 0.02
 
 
 @pytest.mark.parametrize("names", RESIDUAL, ids="-".join)

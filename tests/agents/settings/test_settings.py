@@ -35,6 +35,7 @@ def test_preset_fits_its_environment(env, algo, variant):
 def test_every_environment_has_a_preset_of_every_kind():
     ids = {name for name in gym.registry if name.startswith("PAM/")}
     kinds = (("ppo", ""), ("sac", ""), ("tqc", ""), ("recurrent_ppo", ""), ("ppo", "residual"))
+    kinds += (("ppo", "robust"),)
     assert {(name, *kind) for name in ids for kind in kinds} <= set(configs.presets())
 
 

@@ -19,6 +19,7 @@ from short_runs import ID, KINDS, QUIET, killed_after, kind, tiny, trained
 from stable_baselines3.common.evaluation import evaluate_policy
 
 from agents.__main__ import main
+from agents.export.export import layer
 from agents.policies.policy import OnnxPolicy
 from agents.policies.policy_file import finished
 from agents.settings import presets as configs
@@ -29,6 +30,7 @@ from agents.training.building import make_env, make_model
 from agents.training.checkpoint import MARK, CheckpointError
 from agents.training.record import CHECKPOINT, Run
 from agents.vec_envs.batch import make_batch_vec_env
+from agents.vec_envs.widening import WideningVecEnv
 from benchmarks.scenarios import scenario as scenarios
 from tests.sweeps.processes_of import wait_until
 
@@ -204,6 +206,15 @@ def test_record_holds_the_cost_of_the_training(short_run):
     assert all(entry["rms"] > 0.0 for entry in card["evaluation"])
     log = next((folder / "tensorboard").glob("events*")).read_bytes()
     assert b"tuning/rms" in log
+
+
+def test_record_holds_the_ranges_at_the_end_of_widening(short_run):
+    model, folder = short_run("widening")
+    ranges = json.loads((folder / "policy.json").read_text())["training"]["ranges"]
+    wrapper: Any = layer(model.get_env(), WideningVecEnv)
+    assert ranges == wrapper.ranges()
+    assert wrapper.widths.min() >= 0.2
+    assert wrapper.widths.max() > 0.2
 
 
 def test_evaluations_do_not_change_the_training(tmp_path, short_run):

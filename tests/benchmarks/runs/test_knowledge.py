@@ -119,7 +119,8 @@ def test_policy_trained_on_an_undeclared_plant_is_reported_as_such():
     assert not trained(other, nominal, env)
     assert not trained(object(), nominal, env)
     assert not trained(both, nominal, drawn)
-    assert trained(Policy([nominal.digest()], randomize=True), nominal, drawn)
+    assert not trained(Policy([nominal.digest()], randomize=True), nominal, drawn)
+    assert trained(Policy([nominal.digest()], randomize=True), plant, drawn)
     env.close()
     drawn.close()
 
