@@ -144,8 +144,7 @@ def _rubber(q: np.ndarray, pressure: float, strain: float) -> float:
     sin2 = 1.0 - cos2
     thread = 1.0 + max(pressure, -2.0) / q[4]
     x = max(1.0 - q[5] * strain, 0.5)  # axial stretch between the fittings
-    y = x / thread
-    gas = q[0] * pressure * (3.0 * cos2 * y * y - 1.0) / sin2
+    gas = q[0] * pressure * (3.0 * cos2 * x * x - thread * thread) / sin2
     ring = max((thread * thread - x * x * cos2) / sin2, 0.05)  # squared hoop stretch
     slope = -2.0 * x * cos2 / sin2
     wall = 2.0 * x * ring + x * x * slope

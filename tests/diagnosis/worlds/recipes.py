@@ -75,10 +75,10 @@ def _integrating(rng: np.random.Generator) -> dict[str, float]:
 
 
 def _pulsed(rng: np.random.Generator) -> dict[str, float]:
-    fill = rng.uniform(12.0, 22.0)
+    fill = rng.uniform(18.0, 32.0)
     return {
         "fill_bar_s": fill,
-        "vent_bar_s": fill * rng.uniform(1.0, 1.5),
+        "vent_bar_s": fill * rng.uniform(1.3, 1.9),
         "opening_bar": rng.uniform(0.35, 0.7),
         "short_pulse": rng.uniform(0.005, 0.02),
     }
@@ -159,7 +159,7 @@ RECIPES: dict[str, Recipe] = dict(
             Recipe("logistic", "skewed_play", "pressure", "lag", _everything),
             Recipe("rational", "end_slip", "length", "slow_tail", _slow_tail, (0.15, 0.4), 1.75),
             Recipe("locking", "iwan", "length", "integrating", _integrating, (0.2, 0.5), width=1.5),
-            Recipe("rubber", "coulomb", "length", "pulsed", _pulsed, squeeze=(0.3, 0.8)),
+            Recipe("rubber", "coulomb", "length", "pulsed", _pulsed, width=0.9, squeeze=(0.3, 0.8)),
             Recipe("capped", "tanh_play", "pressure", "tube", _tube, width=1.15),
             Recipe("drawn", "dead_zone_play", "pressure", "offset", _bulging, width=1.15),
             Recipe("hyperbolic", "rate_weak", "length", "cascade", _cascade, (0.0, 0.3)),
