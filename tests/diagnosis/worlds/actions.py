@@ -70,6 +70,8 @@ def setpoint(
         tube = eff[DEAD_TIME, 0] if eff[DEAD_TIME, 1] > 0.5 else 0.0
         delay += eff[DEAD_TIME, 0] - 0.5 * tube
     wanted = held(command, time - delay, period, dt)
+    if valve[15] > 0.0:  # a fall arrives later than a rise
+        wanted = max(wanted, held(command, time - delay - valve[15], period, dt))
     if tube > 0.0:
         for i in range(TUBE, TUBE + 3):
             st[i] += (wanted - st[i]) * dt / (dt + tube / 6.0)

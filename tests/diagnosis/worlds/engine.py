@@ -28,7 +28,7 @@ from .names import (
     SLACK,
     SLEW,
 )
-from .valve import AMBIENT, flow, valve_rate
+from .valve import AMBIENT, FLOWS, flow, valve_rate
 
 PREROLL = 110
 """Rows at rest before the first one."""
@@ -47,6 +47,7 @@ SCALARS = (
     "start_strain",
     "settling",
     "memory",
+    "squeeze",
 )
 
 
@@ -129,7 +130,7 @@ def run(
     st[SOFT] = 1.0
     work, extra = np.zeros((2, 4)), np.zeros(3)
     states = np.zeros((3, SIZE))
-    vs = np.zeros(3)
+    vs = np.zeros(4)
     p = max(valve[1], 0.0)
     vs[1] = p
     x = length * balance(law, q, table, p, load[0])
@@ -154,7 +155,7 @@ def run(
         target = setpoint(eff, st, command, time, period, valve, p, now, dt)
         rate = 0.0
         if (shut[row] and k >= 0) or (-MOVED * sub <= k < 0 and c[8] > 0.0):
-            vs[0] = vs[2] = 0.0
+            vs[0] = vs[2] = vs[3] = 0.0
         else:
             supply = valve[14]
             if eff[DROOP, 0] > 0.0 and eff[DROOP, 1] < 0.5:
@@ -162,7 +163,7 @@ def run(
             rate = valve_rate(valve_kind, valve, p, vs, target, supply, dt)
             rate = _limit(rate, eff, valve, valve_kind, p)
             vs[0] = rate
-        if valve_kind == 2:
+        if valve_kind == FLOWS[0] or valve_kind == FLOWS[1]:
             swell = 1.0 + 4.0 * x / length
             rate = rate / swell - (p + AMBIENT) * 4.0 * v / (length * swell)
         if eff[LEAK, 0] > 0.0:
@@ -186,6 +187,8 @@ def run(
             leftover -= dt / c[10] * leftover
         scale = loop_scale(eff, p, weight)
         slip = max(1.0 + c[3] * (p / 3.0 - 1.0), 0.05)
+        if c[12] > 0.0:
+            slip = math.sqrt((p + c[12]) / (3.0 + c[12]))
         dp = felt - last_p
         last_p = felt
         if driven:

@@ -8,6 +8,7 @@ import numpy as np
 from .laws import balance
 from .loop_draws import Operator
 from .names import POSITION_NOISE, PRESSURE_NOISE
+from .recipes import RECIPES
 from .rig import Rig, law_arrays
 
 
@@ -143,7 +144,10 @@ def _drive(rng: Rng, rig: Rig) -> Form:
 
 def _droop(rng: Rng, rig: Rig) -> Form:
     own = 1.0, rng.uniform(4.0, 20.0), rng.uniform(5.9, 6.4)
-    return Form(int(rng.integers(2)), 0.01, 0.3, own)
+    form = int(rng.integers(2))
+    if RECIPES[rig.world].valve in ("integrating", "pulsed"):
+        form = 0  # a controlled valve reaches its target until the supply is too low
+    return Form(form, 0.01, 0.3, own)
 
 
 def _stick(rng: Rng, rig: Rig) -> Form:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .laws import MAP_PRESSURE, MAP_SHAPE, MAP_STRAIN
+from .laws import MAP_PRESSURE, MAP_SHAPE, MAP_STRAIN, curve
 
 Constants = tuple[float, ...]
 
@@ -109,6 +109,71 @@ def _rational(rng: np.random.Generator, area: float) -> Constants:
     )
 
 
+def _locking(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        rng.uniform(62.0, 78.0) * area,
+        rng.uniform(0.27, 0.34),
+        rng.uniform(450.0, 800.0) * area,
+        rng.uniform(0.085, 0.125),
+        rng.uniform(300.0, 750.0) * area,
+        rng.uniform(0.5, 1.5),
+        rng.uniform(0.001, 0.003),
+        rng.uniform(5500.0, 8000.0) * area,
+        rng.uniform(0.008, 0.013),
+    )
+
+
+def _rubber(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        7.85 * area * rng.uniform(0.9, 1.1),
+        float(np.cos(np.radians(rng.uniform(24.0, 27.5))) ** 2),
+        rng.uniform(7.0, 12.0) * area,
+        rng.uniform(1.5, 5.0) * area,
+        rng.uniform(150.0, 400.0),
+        rng.uniform(1.05, 1.2),
+        rng.uniform(3000.0, 4500.0) * area,
+        rng.uniform(0.008, 0.013),
+    )
+
+
+def _capped(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        rng.uniform(63.0, 80.0) * area,
+        rng.uniform(0.25, 0.3),
+        rng.uniform(0.06, 0.2),
+        rng.uniform(0.04, 0.07),
+        rng.uniform(0.06, 0.18),
+        rng.uniform(250.0, 500.0) * area,
+        rng.uniform(2e3, 8e3) * area,
+        rng.uniform(5500.0, 8000.0) * area,
+        rng.uniform(0.008, 0.013),
+    )
+
+
+def _drawn(rng: np.random.Generator, area: float) -> Constants:
+    """Draw pressure needed over strain, convex then concave, and force per bar over strain."""
+    slopes = np.array([1.5, 1.5, 1.15, 0.8, 0.7, 0.85, 1.4, 2.2]) * rng.uniform(0.9, 1.1, 8)
+    needed = np.r_[0.0, np.cumsum(0.04 * slopes * rng.uniform(24.0, 30.0))]
+    needed -= curve(needed, 0, 9, 0.04, 0.0)
+    strains = -0.1 + 0.08 * np.arange(6)
+    per_bar = 1.0 - strains / rng.uniform(0.33, 0.42) * rng.uniform(0.9, 1.1, 6)
+    per_bar *= rng.uniform(62.0, 78.0) * area
+    return (*needed.tolist(), *per_bar.tolist(), rng.uniform(4000.0, 6000.0) * area)
+
+
+def _hyperbolic(rng: np.random.Generator, area: float) -> Constants:
+    bend, power = rng.uniform(0.09, 0.14), rng.uniform(1.0, 1.1)
+    return (
+        rng.uniform(150.0, 260.0) * area,
+        bend,
+        rng.uniform(64.0, 82.0) * area * bend * 6.0 ** (1.0 - power),
+        power,
+        rng.uniform(2.5e-5, 6.5e-5) / area,
+        rng.uniform(5500.0, 8000.0) * area,
+        rng.uniform(0.008, 0.013),
+    )
+
+
 def draw_map(rng: np.random.Generator, area: float) -> Constants:
     """Draw the knots of a map [N]: a smooth base with bumps of a few per cent."""
     p = MAP_PRESSURE[0] + MAP_PRESSURE[1] * np.arange(MAP_SHAPE[0])[:, None]
@@ -144,6 +209,11 @@ _DRAWS: dict[str, Callable[[np.random.Generator, float], Constants]] = {
     "sarosi": _sarosi,
     "logistic": _logistic,
     "rational": _rational,
+    "locking": _locking,
+    "rubber": _rubber,
+    "capped": _capped,
+    "drawn": _drawn,
+    "hyperbolic": _hyperbolic,
 }
 
 

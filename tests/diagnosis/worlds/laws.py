@@ -16,6 +16,11 @@ LAWS = (
     "sarosi",
     "logistic",
     "rational",
+    "locking",
+    "rubber",
+    "capped",
+    "drawn",
+    "hyperbolic",
 )
 MAP_SHAPE = (14, 16)
 """Knots of a drawn map over pressure and strain."""
@@ -118,6 +123,71 @@ def _logistic(q: np.ndarray, pressure: float, strain: float, load: float) -> flo
 
 
 @njit(cache=True)
+def _softplus(value: float, width: float) -> float:
+    """Positive part of a number, rounded over a width."""
+    y = value / width
+    return value if y > 30.0 else width * math.log1p(math.exp(y))
+
+
+@njit(cache=True)
+def _locking(q: np.ndarray, pressure: float, strain: float) -> float:
+    """Straight lines in strain with a kink where the strands of the braid touch."""
+    free = q[0] * pressure * (1.0 - strain / q[1]) - q[2] * strain
+    jam = q[4] * (1.0 + q[5] * max(pressure, 0.0) / 6.0)
+    return free - jam * _softplus(strain - q[3], q[6]) + lock(strain, q[7], q[8])
+
+
+@njit(cache=True)
+def _rubber(q: np.ndarray, pressure: float, strain: float) -> float:
+    """Energy of the gas, of a Mooney-Rivlin bladder and of threads that stretch with pressure."""
+    cos2 = q[1]
+    sin2 = 1.0 - cos2
+    thread = 1.0 + max(pressure, -2.0) / q[4]
+    x = max(1.0 - q[5] * strain, 0.5)  # axial stretch between the fittings
+    gas = q[0] * pressure * (3.0 * cos2 * x * x - thread * thread) / sin2
+    ring = max((thread * thread - x * x * cos2) / sin2, 0.05)  # squared hoop stretch
+    slope = -2.0 * x * cos2 / sin2
+    wall = 2.0 * x * ring + x * x * slope
+    first = 2.0 * x + slope - wall / (x * x * ring) ** 2
+    second = wall - 2.0 / x**3 - slope / ring**2
+    return gas + q[2] * first + q[3] * second + lock(strain, q[6], q[7])
+
+
+@njit(cache=True)
+def _capped(q: np.ndarray, pressure: float, strain: float) -> float:
+    """Cylinder whose ends round off while it contracts, and a bladder slack at low pressure."""
+    taut = pressure * abs(pressure) / (abs(pressure) + q[4])
+    share = 1.0 - q[2] * (1.0 - math.exp(-max(strain, -0.1) / q[3]))
+    x = 1.0 - strain / (q[1] * share)
+    active = q[0] * taut * (0.62 * x + 0.38 * x * abs(x)) * share
+    return active - q[5] * strain - q[6] * strain**3 + lock(strain, q[7], q[8])
+
+
+@njit(cache=True)
+def curve(q: np.ndarray, at: int, count: int, step: float, strain: float) -> float:
+    """Cubic B-spline of `count` knots from place `at` on, straight beyond -0.02 and 0.22."""
+    b = (strain + 0.02) / step
+    inside = min(max(b, 0.0), count - 3.0 - 1e-9)
+    i = int(inside)
+    u = inside - i
+    a0, a1, a2, a3 = q[at + i], q[at + i + 1], q[at + i + 2], q[at + i + 3]
+    value = (1.0 - u) ** 3 * a0 + (3.0 * u**3 - 6.0 * u**2 + 4.0) * a1
+    value += (-3.0 * u**3 + 3.0 * u**2 + 3.0 * u + 1.0) * a2 + u**3 * a3
+    slope = (2.0 * u - u * u - 1.0) * a0 + (3.0 * u * u - 4.0 * u) * a1
+    slope += (1.0 + 2.0 * u - 3.0 * u * u) * a2 + u * u * a3
+    return value / 6.0 + 0.5 * slope * (b - inside)
+
+
+@njit(cache=True)
+def _hyperbolic(q: np.ndarray, pressure: float, strain: float) -> float:
+    """Hyperbola of force and contraction, in series with an elastic tendon."""
+    reach = q[0] * q[1] + q[2] * signed_power(pressure, q[3])
+    b = strain + q[1] + q[0] * q[4]
+    root = max(b * b - 4.0 * q[4] * (q[0] * (strain + q[1]) - reach), 0.0)
+    return (math.sqrt(root) - b) / (2.0 * q[4]) + lock(strain, q[5], q[6])
+
+
+@njit(cache=True)
 def force(
     kind: int,
     q: np.ndarray,
@@ -155,6 +225,17 @@ def force(
         return q[0] * (passive - 3.2256 * pressure * k + 109.204 * pressure - 203.7) - q[2] * k
     if kind == 8:
         return _logistic(q, pressure, strain, load)
+    if kind == 10:
+        return _locking(q, pressure, strain)
+    if kind == 11:
+        return _rubber(q, pressure, strain)
+    if kind == 12:
+        return _capped(q, pressure, strain)
+    if kind == 13:
+        taut = pressure - curve(q, 0, 9, 0.04, strain)
+        return taut * curve(q, 9, 6, 0.08, strain) + lock(strain, q[15], 0.01)
+    if kind == 14:
+        return _hyperbolic(q, pressure, strain)
     r = strain / q[1]
     active = pressure / 6.0 * max(1.0 - r, 0.0) ** q[2] / max(1.0 + q[3] * r, 0.5)
     passive = q[4] * r / max(1.0 + q[5] * r, 0.5)

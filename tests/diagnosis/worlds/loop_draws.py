@@ -81,6 +81,55 @@ def end_slip(rng: np.random.Generator, half: float, length: float) -> Operator:
     return stops(breaks, np.array([0.2, 0.2, 0.15, 0.25, 0.2]), 0.0)
 
 
+def iwan(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw sliders with a power law of break lengths [mm], and some that slip last of all."""
+    edges = np.geomspace(0.0008, rng.uniform(0.03, 0.05), SIZE) * length
+    breaks = np.r_[np.sqrt(edges[1:] * edges[:-1]), edges[-1]]
+    shares = breaks ** (1.0 + rng.uniform(-0.8, -0.2)) * np.r_[np.diff(edges), 0.0]
+    last = rng.uniform(0.1, 0.35)
+    shares *= (1.0 - last) / shares.sum()
+    shares[-1] = last
+    return stops(breaks, shares, 0.0)
+
+
+def coulomb(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw Coulomb friction: strands that slip after a small part of the length [mm]."""
+    breaks = np.array([0.0015, 0.003, 0.007]) * length * rng.uniform(0.8, 1.3, 3)
+    return stops(breaks, np.array([0.45, 0.3, 0.25]) * rng.uniform(0.8, 1.2, 3), 0.0)
+
+
+def rate_weak(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw friction that rises or falls by a few per cent with the logarithm of the rate."""
+    breaks = np.array([0.002, 0.006, 0.018]) * length * rng.uniform(0.8, 1.3, 3)
+    shares = np.array([0.35, 0.35, 0.3]) * rng.uniform(0.8, 1.2, 3)
+    rate = rng.uniform(0.006, 0.015) * (1.0 if rng.random() < 0.6 else -1.0)
+    others = np.array([rate, rng.uniform(0.3, 1.0)])
+    return _pack("rate_weak", breaks, shares / shares.sum(), others)
+
+
+def tanh_play(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw plays between envelopes that saturate."""
+    count = int(rng.integers(4, 7))
+    thresholds = np.linspace(0.35, 2.4, count)
+    shares = 0.92 * rng.dirichlet(np.full(count, 4.0))
+    thresholds = thresholds * half / np.sum(shares * thresholds)
+    up = rng.uniform(5.0, 8.0)
+    others = np.array([up, up * rng.uniform(0.9, 1.1), rng.uniform(2.4, 3.6)])
+    return _pack("tanh_play", thresholds, shares / half, others)
+
+
+def dead_zone_play(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw plays whose sum passes five dead zones, so that the loop's width has steps."""
+    count = int(rng.integers(5, 8))
+    thresholds = np.linspace(0.3, 2.6, count) ** 1.2
+    shares = 0.9 * rng.dirichlet(np.full(count, 4.0))
+    thresholds = thresholds * half / np.sum(shares * thresholds)
+    slopes = np.r_[1.0, rng.uniform(0.72, 1.0, 5)]
+    zones = np.linspace(0.7, 5.0, 5) + rng.uniform(-0.3, 0.3, 5)
+    others = np.r_[np.diff(slopes), zones, half]
+    return _pack("dead_zone_play", thresholds, shares / half, others)
+
+
 def dahl(rng: np.random.Generator, half: float, length: float) -> Operator:
     """Draw a Dahl loop in length."""
     reach = np.array([length * rng.uniform(0.004, 0.012)])
@@ -127,4 +176,9 @@ DRAWS: dict[str, Callable[[np.random.Generator, float, float], Operator]] = {
     "bouc_wen_length": bouc_wen_length,
     "backlash": backlash,
     "blunt": blunt,
+    "iwan": iwan,
+    "coulomb": coulomb,
+    "rate_weak": rate_weak,
+    "tanh_play": tanh_play,
+    "dead_zone_play": dead_zone_play,
 }

@@ -5,7 +5,17 @@ import math
 import numpy as np
 from numba import njit
 
-LOOPS = ("stops", "bouc_wen", "dahl", "lugre", "preisach", "skewed_play")
+LOOPS = (
+    "stops",
+    "bouc_wen",
+    "dahl",
+    "lugre",
+    "preisach",
+    "skewed_play",
+    "tanh_play",
+    "dead_zone_play",
+    "rate_weak",
+)
 SIZE = 12
 """Elements of an operator, and columns of its constants (thresholds, shares, others)."""
 
@@ -14,7 +24,49 @@ SIZE = 12
 def start_loop(kind: int, op: np.ndarray, z: np.ndarray, u: float, memory: float) -> None:
     """Set the state at input `u`; `memory` (0 to 1) is what an earlier descent left."""
     for i in range(SIZE):
-        z[i] = u + memory * op[0, i] if kind >= 4 else -memory
+        z[i] = u + memory * op[0, i] if 4 <= kind < 8 else -memory
+
+
+@njit(cache=True)
+def _bent(u: float, reach: float, centre: float) -> float:
+    """Envelope that saturates at both ends, 0 at 0."""
+    return reach * (math.tanh((u - centre) / reach) + math.tanh(centre / reach))
+
+
+@njit(cache=True)
+def _kinked(u: float, others: np.ndarray) -> float:
+    """Superpose five dead zones on an input."""
+    total = u
+    for i in range(5):
+        total += others[i] * max(u - others[5 + i], 0.0)
+    return total
+
+
+@njit(cache=True)
+def _tanh_play(op: np.ndarray, z: np.ndarray, u: float, scale: float) -> float:
+    """Plays between envelopes that saturate differently for rising and falling input."""
+    up, down, centre = op[2, 0], op[2, 1], op[2, 2]
+    middle = 0.5 * (_bent(u, up, centre) + _bent(u, down, centre))
+    total = 0.0
+    for i in range(SIZE):
+        if op[1, i] > 0.0:
+            reach = op[0, i] * scale
+            low, high = _bent(u - reach, up, centre), _bent(u + reach, down, centre)
+            z[i] = min(max(z[i], low), high)
+            total += op[1, i] * (middle - z[i])
+    return total
+
+
+@njit(cache=True)
+def _rate_weak(op: np.ndarray, z: np.ndarray, du: float, v: float, scale: float) -> float:
+    """Bristles whose bound changes with the logarithm of the rate."""
+    bound = scale * (1.0 + op[2, 0] * math.asinh(abs(v) / op[2, 1]))
+    total = 0.0
+    for i in range(SIZE):
+        if op[1, i] > 0.0:
+            z[i] = (z[i] + du / op[0, i]) / (1.0 + abs(du) / (op[0, i] * bound))
+            total += op[1, i] * z[i]
+    return total
 
 
 @njit(cache=True)
@@ -49,6 +101,10 @@ def loop_step(
         bound = scale * (1.0 + op[2, 0] * math.exp(-((v / op[2, 1]) ** 2)))
         z[0] = (z[0] + du / op[0, 0]) / (1.0 + abs(du) / (op[0, 0] * bound))
         return z[0]
+    if kind == 6:
+        return _tanh_play(op, z, u, scale)
+    if kind == 8:
+        return _rate_weak(op, z, du, v, scale)
     total = 0.0
     for i in range(SIZE):
         if op[1, i] > 0.0:
@@ -61,4 +117,7 @@ def loop_step(
             if kind == 4:
                 bent = op[2, i] * 1.9098593171 * math.sin(0.5235987756 * z[i])
             total += op[1, i] * (u - z[i] - bent)
+    if kind == 7:
+        half = op[2, 10]
+        return (_kinked(u, op[2]) - _kinked(u - half * total, op[2])) / half
     return total

@@ -11,6 +11,11 @@ WORLDS = (
     "sarosi_bouc_wen_length_delayed",
     "logistic_skewed_play_all_at_once",
     "rational_end_slip_slow_tail",
+    "braid_lock_power_law_iwan_integrating",
+    "rubber_energy_root_coulomb_pulsed",
+    "end_caps_slack_tanh_play_long_tube",
+    "drawn_curve_dead_zone_play_bulging_offset",
+    "hyperbolic_tendon_rate_weak_cascade",
 )
 EFFECTS = (
     "creep",

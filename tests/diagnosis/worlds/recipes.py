@@ -1,4 +1,4 @@
-"""The ten worlds: which law, loop and regulator each has, and how its regulator is drawn."""
+"""The worlds: which law, loop and regulator each has, and how its regulator is drawn."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -64,6 +64,50 @@ def _slow_tail(rng: np.random.Generator) -> dict[str, float]:
     return _lag(rng) | {"slow_share": rng.uniform(0.03, 0.09), "slow_s": rng.uniform(0.5, 1.0)}
 
 
+def _integrating(rng: np.random.Generator) -> dict[str, float]:
+    lag = rng.uniform(0.05, 0.09)
+    return {
+        "lag_s": lag,
+        "integral_s2": rng.uniform(0.06, 0.15) / lag**2,
+        "clamp_bar_s": rng.uniform(0.3, 0.8),
+        "spool_s": rng.uniform(0.004, 0.01),
+    }
+
+
+def _pulsed(rng: np.random.Generator) -> dict[str, float]:
+    fill = rng.uniform(18.0, 32.0)
+    return {
+        "fill_bar_s": fill,
+        "vent_bar_s": fill * rng.uniform(1.3, 1.9),
+        "opening_bar": rng.uniform(0.35, 0.7),
+        "short_pulse": rng.uniform(0.005, 0.02),
+    }
+
+
+def _tube(rng: np.random.Generator) -> dict[str, float]:
+    lag = rng.uniform(0.04, 0.09)
+    return {
+        "lag_s": lag,
+        "vent_lag_s": lag * rng.uniform(1.04, 1.2),
+        "dead_time_s": rng.uniform(0.012, 0.035),
+        "vent_delay_s": rng.uniform(0.003, 0.012),
+    }
+
+
+def _bulging(rng: np.random.Generator) -> dict[str, float]:
+    bulge, tilt = rng.choice([-1.0, 1.0], 2) * rng.uniform([0.008, 0.004], [0.03, 0.015])
+    return _lag(rng) | {"bulge_bar": bulge, "tilt_bar": tilt}
+
+
+def _cascade(rng: np.random.Generator) -> dict[str, float]:
+    delay = rng.uniform(0.01, 0.025) if rng.random() < 0.5 else 0.0
+    return {
+        "lag_s": rng.uniform(0.03, 0.06),
+        "pilot_s": rng.uniform(0.08, 0.15),
+        "dead_time_s": delay,
+    }
+
+
 @dataclass(frozen=True)
 class Recipe:
     """Kinds of law, loop and regulator of a world."""
@@ -75,11 +119,13 @@ class Recipe:
     draw_valve: Draw
     growth: tuple[float, float] = (0.0, 0.0)  # of slip force with pressure, per 3 bar
     width: float = 1.0  # scale of the loop, so that those that open slowly are as wide
+    squeeze: tuple[float, float] = (0.0, 0.0)  # [bar] of slip force that grows as a square root
 
     def valve_vector(self, rng: np.random.Generator) -> tuple[float, ...]:
         """Draw the constants of the regulator, in the order of `KEYS`."""
         values = dict.fromkeys(KEYS, 0.0) | {"supply_bar": rng.uniform(6.6, 7.6)}
         values |= {"lag_s": 0.06, "slow_s": 1.0, "opening_bar": 0.5, "spool_s": 0.01}
+        values |= {"vent_lag_s": 0.06, "pilot_s": 0.1}
         values |= self.draw_valve(rng)
         values["gain"] = rng.uniform(0.98, 1.02)
         values["offset_bar"] = rng.uniform(-0.03, 0.03)
@@ -112,6 +158,11 @@ RECIPES: dict[str, Recipe] = dict(
             ),
             Recipe("logistic", "skewed_play", "pressure", "lag", _everything),
             Recipe("rational", "end_slip", "length", "slow_tail", _slow_tail, (0.15, 0.4), 1.75),
+            Recipe("locking", "iwan", "length", "integrating", _integrating, (0.2, 0.5), width=1.5),
+            Recipe("rubber", "coulomb", "length", "pulsed", _pulsed, width=0.9, squeeze=(0.3, 0.8)),
+            Recipe("capped", "tanh_play", "pressure", "tube", _tube, width=1.15),
+            Recipe("drawn", "dead_zone_play", "pressure", "offset", _bulging, width=1.15),
+            Recipe("hyperbolic", "rate_weak", "length", "cascade", _cascade, (0.0, 0.3)),
         ),
         strict=True,
     )

@@ -59,6 +59,7 @@ class Rig:
     stroke_mm: float  # at 6 bar under 25 N, without loop
     nuisance: Nuisance
     noise: Noise
+    squeeze_bar: float = 0.0  # on the strands at 0 bar; if not 0, slip force grows as a root
 
     @property
     def clock_offset_s(self) -> float:
@@ -183,6 +184,7 @@ def draw_rig(world: str, rng: np.random.Generator, nuisance: bool = True) -> Rig
         stroke_mm=stroke,
         nuisance=chosen,
         noise=draw_noise(common),
+        squeeze_bar=own.uniform(*recipe.squeeze),
     )
 
 

@@ -120,6 +120,7 @@ def _solve(
         "start_strain": rig.nuisance.start_strain,
         "settling": rig.nuisance.start_settling_s,
         "memory": rig.nuisance.loop_memory,
+        "squeeze": rig.squeeze_bar,
     }
     kinds, ops = _operators(rig, effects)
     pressure, position = run(

@@ -9,6 +9,7 @@ import numpy as np
 from .forms import FORMS, Effect
 from .loop_draws import DRAWS
 from .names import POSITION_NOISE, PRESSURE_NOISE
+from .recipes import RECIPES
 from .rig import Rig
 from .run import simulate
 
@@ -107,7 +108,8 @@ def draw_effect(name: str, rig: Rig, rng: np.random.Generator) -> Effect:
     loop = None
     span = rig.length_mm if rig.length_driven else 0.0
     if name == "hysteresis_shape":
-        loop = DRAWS["backlash" if form.form == 0 else "blunt"](rng, rig.half_width_bar, span)
+        sharp = "iwan" if RECIPES[rig.world].loop == "coulomb" else "backlash"
+        loop = DRAWS[sharp if form.form == 0 else "blunt"](rng, rig.half_width_bar, span)
     if name == "hysteresis_drive" and form.form == 1:
         other = "preisach" if rig.length_driven else "dahl"
         loop = DRAWS[other](rng, rig.half_width_bar, rig.length_mm - span)

@@ -5,7 +5,19 @@ import math
 import numpy as np
 from numba import njit
 
-VALVES = ("lag", "second_order", "orifice", "slow_tail")
+VALVES = (
+    "lag",
+    "second_order",
+    "orifice",
+    "slow_tail",
+    "integrating",
+    "pulsed",
+    "tube",
+    "offset",
+    "cascade",
+)
+FLOWS = (VALVES.index("orifice"), VALVES.index("pulsed"))
+"""Valves that pass a mass flow, so that the muscle's volume acts on its pressure."""
 KEYS = (
     "gain",
     "offset_bar",
@@ -22,6 +34,14 @@ KEYS = (
     "opening_bar",
     "spool_s",
     "supply_bar",
+    "vent_delay_s",
+    "vent_lag_s",
+    "integral_s2",
+    "clamp_bar_s",
+    "short_pulse",
+    "bulge_bar",
+    "tilt_bar",
+    "pilot_s",
 )
 """Constants of a valve, in the order of its vector; limits are reciprocal rates, 0 for none."""
 AMBIENT = 1.013  # [bar]
@@ -43,7 +63,7 @@ def flow(upstream: float, downstream: float) -> float:
 def valve_rate(
     kind: int, c: np.ndarray, p: float, state: np.ndarray, target: float, supply: float, dt: float
 ) -> float:
-    """Return the rate of pressure [bar/s]; the state is rate, slow part, spool."""
+    """Return the rate of pressure [bar/s]; the state is rate, slow part, spool, integral."""
     if kind == 1:
         pull = c[6] * c[6] * (target - p) - 2.0 * c[7] * c[6] * state[0]
         return state[0] + dt * pull
@@ -56,4 +76,26 @@ def valve_rate(
     if kind == 3:
         state[1] += dt / c[9] * (target - state[1])
         return ((1.0 - c[8]) * target + c[8] * state[1] - p) / c[5]
+    error = target - p
+    if kind == 4:  # proportional valve with a controller whose integral is clamped
+        if abs(error) < 1e-9:
+            state[2] -= dt / c[13] * state[2]
+            return state[2]
+        state[3] = min(max(state[3] + dt * c[17] * error, -c[18]), c[18])
+        state[2] += dt / c[13] * (error / c[5] + state[3] - state[2])
+        return state[2]
+    if kind == 5:  # on/off valves, pulses averaged; short pulses pass less than their share
+        duty = min(max(error / c[12], -1.0), 1.0)
+        duty *= abs(duty) / (abs(duty) + c[19])
+        if duty >= 0.0:
+            return duty * c[10] * flow(supply + AMBIENT, p + AMBIENT)
+        return duty * c[11] * flow(p + AMBIENT, AMBIENT)
+    if kind == 6:
+        return error / (c[5] if error > 0.0 else c[16])
+    if kind == 7:
+        u = min(target / 6.0, 1.0)
+        return (error + c[20] * 4.0 * u * (1.0 - u) + c[21] * math.sin(2.0 * math.pi * u)) / c[5]
+    if kind == 8:
+        state[1] += dt / c[22] * (target - state[1])
+        return (state[1] - p) / c[5]
     return (target - p) / c[5]
