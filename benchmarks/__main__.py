@@ -533,7 +533,7 @@ def diagnosis(
     """Benchmark the diagnosis on simulated rigs with hidden effects; an interrupted run resumes.
 
     Args:
-        chosen: Set of cases; "worlds" are rigs of ten other simulations, "mutilated" are spoiled
+        chosen: Set of cases; "worlds" are rigs of fifteen other simulations, "mutilated" are spoiled
             recordings.
         offset: Number of the random draw of cases; development on the worlds uses one above 0.
         kind: Only cases of these kinds.

@@ -22,7 +22,7 @@ EACH = {
 """Number of cases of a kind in each world; of single effects, for each effect."""
 LATE = (-2.0, -1.0, 0.5, 1.0, 2.0)
 """Rows by which readings are late."""
-WORLD_SEEDS, KIND_SEEDS = 10_000, 1_000  # numbers of seeds of a world, and of a kind in it
+WORLD_SEEDS, KIND_SEEDS = 5_000, 500  # numbers of seeds of a world, and of a kind in it
 
 Draw = Callable[[int, int, np.random.Generator], Iterator[Case]]
 
