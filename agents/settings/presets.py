@@ -204,6 +204,8 @@ class Config:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, without other algorithms' parts and optional default parts."""
         plain = _plain(dataclasses.asdict(self))
+        if self.history.stride == 1:  # files from before have none
+            del plain["history"]["stride"]
         default = Config(self.env)
         omitted = [a for a in ALGORITHMS if a != self.algo]
         omitted += [name for name in OPTIONAL if getattr(self, name) == getattr(default, name)]
