@@ -68,7 +68,7 @@ class PlantVectorEnv(Batch):
             return super().__new__(cls)
         from pam_envs.envs.device.vector_env import DeviceVectorEnv
 
-        own = ("num_envs", "info", "autoreset_mode", "setup")
+        own = ("num_envs", "info", "autoreset_mode", "setup", "dtype")
         kept = {name: named.pop(name) for name in own if name in named}
         kept["setup"] = kept.get("setup") or cls.make_setup(**named)
         return DeviceVectorEnv(*given, **kept, device=device)
