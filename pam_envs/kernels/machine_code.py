@@ -124,7 +124,7 @@ class MachineCode:
 
     def _compiled(self) -> bytes:
         """Compile and wait; keep the code where that is possible."""
-        from pam_envs.kernels import emission, intermediate
+        from pam_envs.kernels import emission
 
         kernel, notice = self._source.by_address, Notice()
         notice.begin(kernel.name)
@@ -134,7 +134,7 @@ class MachineCode:
             text = ""
         finally:
             notice.end()
-        text = text or intermediate.intermediate(kernel.function, kernel.names, kernel.words)
+        text = text or kernel.intermediate()
         data = emission.emit(text, emission.host())
         try:
             write_whole(kernel.object_file(), data)

@@ -58,6 +58,8 @@ class PlantVectorEnv(Batch):
         Configuration; default: ``make_setup(**arguments)``.
     device : str
         "cpu". For others :class:`~pam_envs.envs.device.vector_env.DeviceVectorEnv` is made.
+    dtype : str
+        "float64". Batches on other devices have "float32" too.
     **arguments : object
         Keyword arguments of the environment.
     """
@@ -82,8 +84,10 @@ class PlantVectorEnv(Batch):
         setup: Setup | None = None,
         *,
         device: str = "cpu",
+        dtype: str = "float64",
         **arguments: Any,
     ) -> None:
+        check_choice("dtype of a batch of device='cpu'", dtype, ("float64",))
         setup = self._configure(setup, arguments)
         self._configure_batch(num_envs, setup)
         check_choice("a batch's render_mode", setup.render_mode, (None, "rgb_array"))
