@@ -17,6 +17,7 @@ OUTPUTS = {
     "PAM/AntagonisticJoint-v0": ("angle", "rad"),
     "PAM/KneeTension-v0": ("tension", "N"),
     "PAM/KneeWalk-v0": ("tension", "N"),
+    "PAM/RedundantManipulator-v0": ("angle_0", "rad"),
 }
 """Controlled quantity of each environment and its unit."""
 OPERATION = re.compile(r"\b(?:add|sub|mul|div|rcp|sqrt|fma)\.[\w.]*(f32|f64)\b")

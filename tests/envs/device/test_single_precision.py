@@ -77,6 +77,11 @@ def test_types_that_a_device_lacks_are_refused(device: str, dtype: str) -> None:
         gym.make_vec(ID, 2, device=device, dtype=dtype)
 
 
+def test_state_with_integers_beyond_float32_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"'elbow'.*keys of random numbers.*choose 'float64'"):
+        gym.make_vec("PAM/ElbowOrthosis-v0", 2, device="host", dtype="float32")
+
+
 uniform: Any = random.uniform
 
 
