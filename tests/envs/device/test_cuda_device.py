@@ -55,6 +55,18 @@ def test_batch_through_the_binding_has_the_same_bits(
             assert np.array_equal(np.from_dlpack(info[key]), other[key])
 
 
+def test_float32_through_the_binding_has_the_bits_of_the_processor() -> None:
+    both: list[Any] = [gym.make_vec(ID, 5, device=d, dtype="float32") for d in ("cuda", "host")]
+    for envs in both:
+        envs.reset(seed=4)
+        for action in np.linspace(-1.0, 1.0, 5):
+            envs.step(np.full(envs.action_space.shape, action))
+    for name in ("rows", "observations", "report"):
+        ours, theirs = (envs.values(name) for envs in both)
+        assert ours.dtype == np.float32
+        assert np.array_equal(ours, theirs)
+
+
 def test_rows_of_an_array_share_its_memory() -> None:
     device = CudaDevice()
     values = np.arange(24.0).reshape(2, 3, 4)
