@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import gymnasium as gym
@@ -9,11 +10,14 @@ import numpy as np
 
 from benchmarks.speed.rates import Chunk, Measurement, Missing, interleaved, median
 from pam_envs.envs.core.lanes import PARTS, LaneKernel
+from pam_envs.envs.device.vector_env import DTYPES
 
 ENVS = ("PAM/MusclePositioning-v0", "PAM/KneeWalk-v0", "PAM/RedundantManipulator-v0")
 SIZES = (4_096, 16_384, 65_536, 262_144, 1_048_576)
-TARGETS = {262_144: 2e8}
-"""Required steps per second of the first environment, by number of environments."""
+CALLS = 4_000_000
+"""Steps of a timed chunk, at least 20 of each environment."""
+TARGETS = {("float64", 262_144): 2e8, ("float32", 262_144): 1e9}
+"""Required steps per second of the first environment, by type and number of environments."""
 PUBLISHED = {
     "MuJoCo Warp, humanoid, 8,192 worlds, steps per second": (
         2_729_192.0,
@@ -37,12 +41,13 @@ def gpu(rounds: int, device: str = "cuda", sizes: Sequence[int] = SIZES) -> list
             raise Missing(str(error)) from error
         title = f"{name[4:-3]}, N = 4,096, 300 steps, values that differ from the CPU's"
         results.append(Measurement("gpu", title, bits, "", 0.0, better="less"))
-        results += registers(name, device)
+        for dtype in DTYPES:
+            results += registers(name, device, dtype)
     for name in ENVS:
-        for size in sizes:
-            value = rate(name, device, size, rounds)
-            floor = TARGETS.get(size) if name == ENVS[0] else None
-            title = f"{name[4:-3]}, float64, N = {size:,}, env-steps per second"
+        for dtype, size in product(DTYPES, sizes):
+            value = rate(name, device, size, rounds, dtype)
+            floor = TARGETS.get((dtype, size)) if name == ENVS[0] else None
+            title = f"{name[4:-3]}, {dtype}, N = {size:,}, env-steps per second"
             results.append(Measurement("gpu", title, value, "1/s", floor))
     results += [
         Measurement("gpu", title, value, "1/s", note=note)
@@ -78,13 +83,13 @@ def _differing(a: np.ndarray, b: np.ndarray) -> int:
     return int((np.ascontiguousarray(a).view(word) != np.ascontiguousarray(b).view(word)).sum())
 
 
-def registers(name: str, device: str) -> list[Measurement]:
+def registers(name: str, device: str, dtype: str) -> list[Measurement]:
     """Return registers and bytes of local memory of a thread, as the driver compiled the PTX."""
-    envs: Any = gym.make_vec(name, 1, device=device)
+    envs: Any = gym.make_vec(name, 1, device=device, dtype=dtype)
     results = []
     for part in PARTS:
-        found = envs.device.compiled(LaneKernel(envs.setup.kernels, part)).attributes
-        title = f"{name[4:-3]}, {part}"
+        found = envs.device.compiled(LaneKernel(envs.setup.kernels, part, dtype)).attributes
+        title = f"{name[4:-3]}, {dtype}, {part}"
         results += [
             Measurement("gpu", f"{title}, registers of a thread", found.num_regs, ""),
             Measurement("gpu", f"{title}, local memory of a thread", found.local_size_bytes, "B"),
@@ -92,19 +97,19 @@ def registers(name: str, device: str) -> list[Measurement]:
     return results
 
 
-def rate(name: str, device: str, number: int, rounds: int) -> float:
+def rate(name: str, device: str, number: int, rounds: int, dtype: str = "float64") -> float:
     """Return steps per second of wall time, with actions on the device and without ``info``."""
-    envs: Any = gym.make_vec(name, number, device=device, info=False)
+    envs: Any = gym.make_vec(name, number, device=device, dtype=dtype, info=False)
     return median(interleaved({"": _stepping(envs)}, min(rounds, 5), time.perf_counter)[""])
 
 
 def _stepping(envs: Any) -> Chunk:
     """Return a chunk that steps a batch and waits for its last step."""
     generator = np.random.default_rng(0)
-    shape = envs.action_space.shape
-    actions = [envs.device.upload(generator.uniform(-1.0, 1.0, shape)) for _ in range(4)]
+    drawn = generator.uniform(-1.0, 1.0, (4, *envs.action_space.shape)).astype(envs.dtype)
+    actions = [envs.device.upload(values) for values in drawn]
     envs.reset(seed=0)
-    calls = max(20, 4_000_000 // envs.num_envs)
+    calls = max(20, CALLS // envs.num_envs)
 
     def chunk() -> int:
         for i in range(calls):

@@ -5,7 +5,7 @@ import os
 import pickle
 import sys
 
-from pam_envs.kernels import emission, intermediate
+from pam_envs.kernels import emission
 from pam_envs.kernels.cache import FOLDER, make_folder, read_whole, write_whole
 from pam_envs.kernels.machine_code import BUSY, Source, is_busy
 
@@ -28,7 +28,7 @@ def main() -> int:
         if packed is not None:
             text = lzma.decompress(packed).decode()
         else:
-            text = intermediate.intermediate(kernel.function, kernel.names, kernel.words)
+            text = kernel.intermediate()
             write_whole(kernel.ir_file, lzma.compress(text.encode(), preset=6))
         write_whole(kernel.object_file(), emission.emit(text, emission.host()))
     finally:

@@ -48,13 +48,24 @@ class AddressKernel:
     names: Mapping[str, Any]
     words: int
     """Length of the address book."""
+    dtype: str = "float64"
+    """Type of numbers that are not integers: "float64" or "float32"."""
 
     @cached_property
     def digest(self) -> str:
         """Digest of the call graph and of the tools that make its LLVM IR."""
         graph = graph_digest(self.function, {**self.names, **INTRINSICS})
-        tools = b"".join(Path(__file__).with_name(name).read_bytes() for name in _TOOLS)
+        used = _TOOLS if self.dtype == "float64" else (*_TOOLS, "single_precision.py")
+        tools = b"".join(Path(__file__).with_name(name).read_bytes() for name in used)
         return hashlib.sha256(graph.encode() + tools).hexdigest()[:16]
+
+    def intermediate(self) -> str:
+        """Return the LLVM IR, compiled in this process."""
+        if self.dtype == "float64":
+            from pam_envs.kernels.intermediate import intermediate
+        else:
+            from pam_envs.kernels.single_precision import intermediate
+        return intermediate(self.function, self.names, self.words)
 
     @property
     def ir_file(self) -> Path:
@@ -113,7 +124,7 @@ class MachineCode:
 
     def _compiled(self) -> bytes:
         """Compile and wait; keep the code where that is possible."""
-        from pam_envs.kernels import emission, intermediate
+        from pam_envs.kernels import emission
 
         kernel, notice = self._source.by_address, Notice()
         notice.begin(kernel.name)
@@ -123,7 +134,7 @@ class MachineCode:
             text = ""
         finally:
             notice.end()
-        text = text or intermediate.intermediate(kernel.function, kernel.names, kernel.words)
+        text = text or kernel.intermediate()
         data = emission.emit(text, emission.host())
         try:
             write_whole(kernel.object_file(), data)

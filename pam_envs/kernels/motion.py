@@ -1,10 +1,12 @@
-"""Exact steps of linear second-order motion: damped oscillator and resonator."""
+"""Motions and signals in time: exact second-order steps, ring of the last values of a signal."""
 
 from typing import Any
 
 from pam_envs.kernels.arithmetic import TURN, decay
 from pam_envs.kernels.build import kernel
 
+N_HISTORY = 16
+"""Rows of a ring, one a control period: a power of two."""
 LARGEST_PHASE = 16.0
 """Largest ``abs(k - d^2 / 4) h^2`` for which the step's series hold (3e-7 relative)."""
 
@@ -92,3 +94,22 @@ def resonator_step(
     )
     rows[state][j], rows[state + 1][j] = y + moved, rate
     return y + moved, rate
+
+
+@kernel
+def note(rows: Any, ring: int, j: int, step: int, value: float) -> None:
+    """Write the value of control period ``step`` into the ring that begins at row ``ring``."""
+    rows[ring + (step & (N_HISTORY - 1))][j] = value
+
+
+@kernel
+def noted(rows: Any, ring: int, j: int, step: int, back: int) -> float:
+    """Return the value of ``back`` control periods before ``step``, at most ``N_HISTORY - 1``."""
+    return rows[ring + ((step + N_HISTORY - back) & (N_HISTORY - 1))][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def fill_ring(rows: Any, ring: int, j: int, value: float) -> None:
+    """Begin the ring of a signal that was constant."""
+    for k in range(N_HISTORY):
+        rows[ring + k][j] = value

@@ -13,8 +13,7 @@ from typing import Any, ClassVar
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.kernels.arithmetic import TURN, count_on, decay
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.kernels.history import note, noted
-from pam_envs.kernels.motion import resonator_step
+from pam_envs.kernels.motion import note, noted, resonator_step
 from pam_envs.parameters import assumed, derived, effect, named_rows, parameter_rows, published
 from pam_envs.pneumatics.flow import FlowEffects, usual_conductance
 

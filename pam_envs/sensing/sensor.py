@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.kernels.history import N_HISTORY, fill_ring, note, noted
+from pam_envs.kernels.motion import N_HISTORY, fill_ring, note, noted
 from pam_envs.parameters import assumed, effect, parameter_rows
 
 _SEEN = "not published; of the order seen on public rigs"

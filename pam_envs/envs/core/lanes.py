@@ -80,6 +80,8 @@ def restart_lane(book: Any, lane: int) -> None:
 
 
 PARTS = {"step": step_lane, "restart": restart_lane}
+UNREACHED = {"FAR": 1e38, "EVERYTHING": 1e38}
+"""Numbers beyond any input of a hysteresis model, within the range of float32."""
 ARCHITECTURE = "sm_80"
 """Oldest architecture for which PTX is emitted; drivers compile it for newer ones."""
 _LANE = "pam_lane"
@@ -133,17 +135,25 @@ class LaneKernel:
         Kernels of a family of environments.
     part : {"step", "restart"}
         Part of a control period.
+    dtype : {"float64", "float32"}
+        Type of all numbers that are neither integers nor observations.
     """
 
     kernels: Any
     part: str
+    dtype: str = "float64"
 
     @property
     def by_address(self) -> AddressKernel:
         """The kernel that takes an address book and a lane."""
         single = self.kernels.by_address
         name = f"{self.part}_lane_{single.name.removeprefix('single_')}"
-        return AddressKernel(name, PARTS[self.part], single.names, single.words)
+        if self.dtype == "float64":
+            return AddressKernel(name, PARTS[self.part], single.names, single.words)
+        names = {**single.names, **UNREACHED}
+        return AddressKernel(
+            f"{name}_{self.dtype}", PARTS[self.part], names, single.words, self.dtype
+        )
 
     def ptx(self, name: str, architecture: str = ARCHITECTURE) -> bytes:
         """Return PTX with one kernel, ``name(int64_t *book, int64_t number)``."""

@@ -61,6 +61,8 @@ class PlantVectorEnv(Batch):
         Configuration; default: ``make_setup(**arguments)``.
     device : str
         "cpu". For others :class:`~pam_envs.envs.device.vector_env.DeviceVectorEnv` is made.
+    dtype : str
+        "float64". Batches on other devices have "float32" too.
     **arguments : object
         Keyword arguments of the environment.
     """
@@ -71,7 +73,7 @@ class PlantVectorEnv(Batch):
             return super().__new__(cls)
         from pam_envs.envs.device.vector_env import DeviceVectorEnv
 
-        own = ("num_envs", "info", "autoreset_mode", "setup")
+        own = ("num_envs", "info", "autoreset_mode", "setup", "dtype")
         kept = {name: named.pop(name) for name in own if name in named}
         kept["setup"] = kept.get("setup") or cls.make_setup(**named)
         return DeviceVectorEnv(*given, **kept, device=device)
@@ -85,8 +87,10 @@ class PlantVectorEnv(Batch):
         setup: Setup | None = None,
         *,
         device: str = "cpu",
+        dtype: str = "float64",
         **arguments: Any,
     ) -> None:
+        check_choice("dtype of a batch of device='cpu'", dtype, ("float64",))
         setup = self._configure(setup, arguments)
         self._configure_batch(num_envs, setup)
         check_choice("a batch's render_mode", setup.render_mode, (None, "rgb_array"))

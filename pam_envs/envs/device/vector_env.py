@@ -21,6 +21,10 @@ BOOK = (
     *("actions", "observations", "report", "flags"),
 )
 """Arrays in the order of the address book."""
+DTYPES = ("float64", "float32")
+"""Types of numbers that are neither integers nor observations."""
+KEYS_IN_STATE = ("elbow",)
+"""Families whose state holds keys of random numbers, integers that float32 cannot hold."""
 
 
 class DeviceVectorEnv(Batch):
@@ -42,6 +46,9 @@ class DeviceVectorEnv(Batch):
         Number of rows.
     device : Device or str
         "cuda", "cuda:1" for the second GPU, or "host" for the processor in its place.
+    dtype : {"float64", "float32"}
+        Type of the state, of parameters and of all arithmetic but random numbers. "float32" is not
+        offered for the elbow orthosis.
     info : bool
         Whether steps return ``info``; learning needs none and is faster without.
     autoreset_mode : AutoresetMode or str
@@ -55,6 +62,7 @@ class DeviceVectorEnv(Batch):
         num_envs: int = 1,
         *,
         device: Device | str = "cuda",
+        dtype: str = "float64",
         info: bool = True,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         setup: Setup,
@@ -70,6 +78,13 @@ class DeviceVectorEnv(Batch):
             (AutoresetMode.SAME_STEP.value,),
         )
         self.device = device_of(device) if isinstance(device, str) else device
+        check_choice("dtype", dtype, DTYPES)
+        if dtype == "float32" and setup.kernels.family in KEYS_IN_STATE:
+            raise ValueError(
+                f"dtype = 'float32' is not offered for the family {setup.kernels.family!r}: its "
+                "state holds 32-bit keys of random numbers, which float32 rounds; choose 'float64'"
+            )
+        self.dtype = dtype
         self.with_info = bool(info)
         self._torch = _torch()
         self._arrays = {name: self.device.upload(a) for name, a in self._initial().items()}
@@ -78,7 +93,9 @@ class DeviceVectorEnv(Batch):
             array = self._arrays[name]
             row[0], row[1 : 1 + len(array.shape)] = self.device.address(array), array.shape
         self._book = self.device.upload(book.ravel())
-        self._launches = {part: self.device.load(LaneKernel(setup.kernels, part)) for part in PARTS}
+        self._launches = {
+            part: self.device.load(LaneKernel(setup.kernels, part, dtype)) for part in PARTS
+        }
 
     def _initial(self) -> dict[str, NDArray[Any]]:
         """Return the arrays of the address book at their initial values."""
@@ -96,7 +113,8 @@ class DeviceVectorEnv(Batch):
             np.zeros((1, keys + 1, n)),
             np.zeros((3, n), np.int8),
         )
-        return dict(zip(BOOK, (*own, *setup.shared, *outputs), strict=True))
+        arrays = zip(BOOK, (*own, *setup.shared, *outputs), strict=True)
+        return {name: a.astype(self.dtype) if a.dtype == np.float64 else a for name, a in arrays}
 
     def reset(
         self,

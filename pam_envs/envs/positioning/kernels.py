@@ -16,7 +16,7 @@ from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, FIRST_CHOICE, FIRST_CONFIG, PERIOD
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.kernels.history import fill_ring
+from pam_envs.kernels.motion import fill_ring
 from pam_envs.kernels.random import uniform
 from pam_envs.muscle.effective_area import volume
 from pam_envs.parameters import declarations

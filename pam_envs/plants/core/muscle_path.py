@@ -22,7 +22,7 @@ from pam_envs.hysteresis.friction_effects import (
 )
 from pam_envs.kernels.arithmetic import count_on
 from pam_envs.kernels.build import LANES, kernel, routine, scratch
-from pam_envs.kernels.history import N_HISTORY, fill_ring
+from pam_envs.kernels.motion import N_HISTORY, fill_ring
 from pam_envs.muscle.effects import TemperatureEffects, temperature_factor
 from pam_envs.parameters import declarations, named_rows, parameter_rows, row_blocks
 from pam_envs.pneumatics.enclosed_air import AHEAD, flow_step, flows_on, squeeze, without_flow

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel, scratch
-from pam_envs.kernels.history import N_HISTORY
+from pam_envs.kernels.motion import N_HISTORY
 from pam_envs.mechanics.guide import turn_on_bearing
 from pam_envs.sensing.sensor import begin_sensor, sense
 

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.kernels.history import fill_ring
-from pam_envs.kernels.motion import oscillator_wide
+from pam_envs.kernels.motion import fill_ring, oscillator_wide
 from pam_envs.plants.core.rollout import Loop, drives_of, first_of, loop_for, plants_of, run
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import (

@@ -14,7 +14,7 @@ from pam_envs.hysteresis.friction_effects import (
     Threshold,
     YieldEffects,
 )
-from pam_envs.kernels.history import N_HISTORY
+from pam_envs.kernels.motion import N_HISTORY
 from pam_envs.mechanics.guide import GuideEffects
 from pam_envs.mechanics.hanging_mass import MOUNT_STATE, MountEffects, SupportEffects
 from pam_envs.muscle.effects import (

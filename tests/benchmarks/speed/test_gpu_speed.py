@@ -3,6 +3,7 @@
 import sys
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -30,6 +31,14 @@ def test_differing_values_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(HostDevice, "read", wrong)
     assert gpu.differing_values(ID, "host", 5, 3) == 3
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_steps_are_counted_in_each_type(dtype: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)  # actions of the device are taken as they are
+    envs: Any = gym.make_vec(ID, 3, device="host", dtype=dtype, info=False)
+    monkeypatch.setattr(gpu, "CALLS", 1)
+    assert gpu._stepping(envs)() == 60
 
 
 def test_missing_gpu_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

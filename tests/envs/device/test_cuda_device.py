@@ -39,9 +39,8 @@ def test_batch_through_the_binding_has_the_same_bits(
         pytest.importorskip("torch")
     else:
         monkeypatch.setitem(sys.modules, "torch", None)
-    ours, theirs = (
-        gym.make_vec(ID, number, device=d, episode_seconds=0.3) for d in ("cuda", "cpu")
-    )
+    ours: Any = gym.make_vec(ID, number, device="cuda", episode_seconds=0.3)
+    theirs: Any = gym.make_vec(ID, number, device="cpu", episode_seconds=0.3)
     assert ours.device.name == "cuda:0"
     first, expected = ours.reset(seed=4)[0], theirs.reset(seed=4)[0]
     assert np.array_equal(np.from_dlpack(first), expected)
@@ -54,6 +53,18 @@ def test_batch_through_the_binding_has_the_same_bits(
             assert np.array_equal(np.from_dlpack(one), two)
         for key in ours.setup.info_keys:
             assert np.array_equal(np.from_dlpack(info[key]), other[key])
+
+
+def test_float32_through_the_binding_has_the_bits_of_the_processor() -> None:
+    both: list[Any] = [gym.make_vec(ID, 5, device=d, dtype="float32") for d in ("cuda", "host")]
+    for envs in both:
+        envs.reset(seed=4)
+        for action in np.linspace(-1.0, 1.0, 5):
+            envs.step(np.full(envs.action_space.shape, action))
+    for name in ("rows", "observations", "report"):
+        ours, theirs = (envs.values(name) for envs in both)
+        assert ours.dtype == np.float32
+        assert np.array_equal(ours, theirs)
 
 
 def test_rows_of_an_array_share_its_memory() -> None:
