@@ -533,8 +533,8 @@ def diagnosis(
     """Benchmark the diagnosis on simulated rigs with hidden effects; an interrupted run resumes.
 
     Args:
-        chosen: Set of cases; "worlds" are rigs of fifteen other simulations, "mutilated" are spoiled
-            recordings.
+        chosen: Set of cases; "worlds" are rigs of fifteen other simulations, "mutilated" are
+            spoiled recordings.
         offset: Number of the random draw of cases; development on the worlds uses one above 0.
         kind: Only cases of these kinds.
         name: Only cases with one of these hidden effects.
