@@ -3,6 +3,7 @@
 import dataclasses
 import os
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import gymnasium as gym
@@ -106,10 +107,14 @@ class PlantVectorEnv(Batch):
         self._all = tuple(for_kernels(a) for a in setup.state(tiles_for(num_envs), LANES))
         self._shared = tuple(for_kernels(a) for a in setup.shared)
         self._keys = len(setup.info_keys)
-        self.hull = setup.parameter_hull()
         spread_out = COMPILED and threads != 1 and num_envs >= PARALLEL_FROM
         self._parallel = spread_out
         self._kernel = setup.kernels.parallel if spread_out else setup.kernels.batch
+
+    @cached_property
+    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Smallest and largest value of each parameter (:meth:`Setup.parameter_hull`)."""
+        return self.setup.parameter_hull()
 
     def reset(
         self,
