@@ -169,7 +169,7 @@ class Privileged:
 
 @dataclass(frozen=True)
 class Widening:
-    """Automatic domain randomisation (Akkaya et al., arXiv:1910.07113).
+    """Automatic domain randomization (Akkaya et al., arXiv:1910.07113).
 
     Every drawn parameter starts with the share ``start`` of its range around the nominal value.
     Where the mean cost of ``episodes`` episodes in the outer ``edge`` of the present range is at

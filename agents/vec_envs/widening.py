@@ -14,7 +14,7 @@ LOW, HIGH = 0, 1
 
 
 class WideningVecEnv(VecEnvWrapper):
-    """Automatic domain randomisation; see :class:`agents.settings.parts.Widening`.
+    """Automatic domain randomization; see :class:`agents.settings.parts.Widening`.
 
     ``widths`` are the shares of the declared ranges, below and above the nominal value, shape
     (2, n_parameters); ``names`` are the parameters. ``venv`` is a ``VecMonitor``, whose episode
