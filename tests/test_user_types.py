@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("mypy")
+pytestmark = pytest.mark.xdist_group("user_types")  # one cache of mypy
 ROOT = Path(__file__).parents[1]
 GOOD = """
 from typing import Any

@@ -13,6 +13,7 @@ from benchmarks.papers import figures as papers
 from benchmarks.papers import inventory
 from benchmarks.papers.published import VERDICTS, Figure, declared
 
+pytestmark = pytest.mark.xdist_group("inventory")  # one process computes all figures
 NUMBERS = {
     "yeh2010": {"figures": 17, "tables": 0, "equations": 13},
     "chakarov2018": {"figures": 7, "tables": 0, "equations": 23},
