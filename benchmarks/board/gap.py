@@ -59,21 +59,23 @@ improvement; *matched* is the best other controller with the same use of preview
 
 
 @lru_cache(maxsize=1)
+def _lists() -> Mapping[str, Any]:
+    return yaml_file.read(FILE, "lists of controllers, tracks and reasons")
+
+
 def beyond() -> tuple[str, ...]:
     """Return the names of the controllers beyond the papers."""
-    return tuple(yaml_file.read(FILE, "list of controllers")["beyond"])
+    return tuple(_lists()["beyond"])
 
 
-@lru_cache(maxsize=1)
 def kinds() -> tuple[str, ...]:
     """Return the endings of tracks of whose plants the controllers do not have the true model."""
-    return tuple(yaml_file.read(FILE, "list of kinds of tracks")["kinds"])
+    return tuple(_lists()["kinds"])
 
 
-@lru_cache(maxsize=1)
 def reasons() -> dict[str, str]:
     """Return what prevents a smaller error, by environment."""
-    return dict(yaml_file.read(FILE, "list of reasons")["reasons"])
+    return dict(_lists()["reasons"])
 
 
 def is_beyond(row: Row) -> bool:
@@ -155,26 +157,27 @@ def gap_of_best(
 
 def page_text(tracks: Mapping[str, Track], bounds: Mapping[str, Bounds]) -> str:
     """Return the page as Markdown."""
+    found = {name: gap_of_best(rows, bounds.get(name)) for name, rows in tracks.items()}
     nominal = {name: rows for name, rows in tracks.items() if name.endswith("_nominal")}
+    gaps = {name: found[name] for name in nominal}
     lines = [INTRODUCTION, "## Nominal tracks", ""]
-    lines += [*_gaps(nominal, bounds), "", *_reasons(nominal, bounds)]
+    lines += [*_gaps(gaps, bounds), "", *_reasons(gaps)]
     lines += ["## Matched preview", "", MATCHED, *_matched(nominal, bounds), ""]
-    others = {name: rows for name, rows in tracks.items() if name not in nominal}
+    others = {name: made for name, made in found.items() if name not in nominal}
     lines += ["## Other tracks", "", *_gaps(others, bounds), ""]
     lines += ["## Controllers beyond the papers", "", BEYOND, *_gains(tracks)]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _gaps(tracks: Mapping[str, Track], bounds: Mapping[str, Bounds]) -> list[str]:
+def _gaps(gaps: Mapping[str, Gap | None], bounds: Mapping[str, Bounds]) -> list[str]:
     heading = ["track", "oracle", "best classical", "paper's controller", "closed", "travel"]
     lines = []
-    for name, rows in tracks.items():
-        found = gap_of_best(rows, bounds.get(name))
+    for name, found in gaps.items():
         if found is not None:
             oracle = _score(found, "oracle")
             both = _named(found.row, found, "row"), _named(found.paper, found, "paper")
             lines.append([f"`{name}`", oracle, *both, _share(found), f"{found.travel:.2f}x"])
-    missing = [f"`{name}`" for name in tracks if name not in bounds]
+    missing = [f"`{name}`" for name in gaps if name not in bounds]
     beside = ["", f"The oracle has not run on {', '.join(missing)}."] if missing else []
     return [*tables(heading, lines), *beside] if lines else ["The oracle has not run."]
 
@@ -192,13 +195,12 @@ def _share(found: Gap) -> str:
     return "-" if np.isnan(found.closed.value) else percent(found.closed)
 
 
-def _reasons(tracks: Mapping[str, Track], bounds: Mapping[str, Bounds]) -> list[str]:
+def _reasons(gaps: Mapping[str, Gap | None]) -> list[str]:
     """Return what prevents a smaller error where less than ``ENOUGH`` of the gap is closed."""
     lines = []
-    for name, rows in tracks.items():
-        found = gap_of_best(rows, bounds.get(name))
+    for found in gaps.values():
         if found is not None and not found.closed.value >= ENOUGH:
-            env = short_env(views.env_of(rows[0]))
+            env = short_env(views.env_of(found.row))
             lines.append(f"- `{env}`: {reasons().get(env, 'no reason is known.')}")
     title = f"Less than {100.0 * ENOUGH:.0f} % of the gap is closed:"
     return [title, "", *lines, ""] if lines else []
@@ -261,11 +263,11 @@ def _gains(tracks: Mapping[str, Track]) -> list[str]:
     heading = ["track", "controller", "RMS", "best other", "its RMS", "lower by", "P", "result"]
     heading += ["matched", "lower by than matched"]
     lines: list[list[str]] = []
-    counts: dict[str, list[bool]] = {}
-    for name, rows in tracks.items():
-        found, same = gain(rows), gain(rows, matched=True)
+    gains = {name: gain(rows) for name, rows in tracks.items()}
+    for name, found in gains.items():
         if found is None:
             continue
+        same = gain(tracks[name], matched=True)
         unit, factor = views.unit_of(found.row)
         split = views.common_split(found.row, found.rival) or PUBLIC
         cells = [f"`{name}`"]
@@ -280,9 +282,12 @@ def _gains(tracks: Mapping[str, Track]) -> list[str]:
             else [f"`{views.name_of(same.rival)}`", percent(same.lower_by)]
         )
         lines.append(cells)
-    for kind in kinds():
-        named = [rows for name, rows in tracks.items() if name.endswith(kind)]
-        counts[kind] = [(made := gain(rows)) is not None and made.holds for rows in named]
+    counts = {
+        kind: [
+            made is not None and made.holds for name, made in gains.items() if name.endswith(kind)
+        ]
+        for kind in kinds()
+    }
     words = ", ".join(
         f"{sum(held)} of {len(held)} {kind.replace('_', '-')} tracks"
         for kind, held in counts.items()

@@ -95,16 +95,16 @@ def calibrate(
     plays = family.plant.hysteresis.model.kind == PlayOperator.kind
     moved = np.isfinite(measured[0]).any() and plays
     if np.isfinite(measured[1]).any():
-        plain_air, fit = regulator(problem, family, blocks, rates)
-        misfit = lacks(problem, blocks, fit)
-        family, fit = slow_tail(problem, plain_air, blocks, fit) if misfit else (plain_air, fit)
-        if misfit and can_flow(plain_air) and lacks(problem, blocks, fit):
-            rough: dict[str, float] = {}
-            if moved:
-                balance = Balance.of(family, measured[0], smoothed(pressure, time), noise[0])
-                rough = balance.flexible() if balance is not None else {}
-            flowing, flow = orifices(problem, plain_air, blocks, fit, rough)
-            family, fit = (family, fit) if flow is fit else (flowing, flow)
+        regulated, fit = regulator(problem, family, blocks, rates)
+        family = regulated
+        if lacks(problem, blocks, fit):
+            family, fit = slow_tail(problem, regulated, blocks, fit) or (family, fit)
+            if can_flow(regulated) and lacks(problem, blocks, fit):
+                rough: dict[str, float] = {}
+                if moved:
+                    balance = Balance.of(family, measured[0], smoothed(pressure, time), noise[0])
+                    rough = balance.flexible() if balance is not None else {}
+                family, fit = orifices(problem, regulated, blocks, fit, rough) or (family, fit)
         found |= fit.values()
         rate = next((r for r in rates if all(t.name in found for t in r.terms)), None)
         if family.plant.air == "regulator" and found[LAG] < FAST:
@@ -221,16 +221,21 @@ def lacks(problem: Problem, blocks: Blocks, fit: Fit) -> bool:
     return bool(blocks.means(left)[1] >= FITS)
 
 
+def gain_of(problem: Problem, blocks: Blocks, before: Fit, after: Fit) -> float:
+    """Return the gain of a fit over another one."""
+    return blocks.gain(*(blocks.errors(problem.rows(f.residual)) for f in (before, after)))
+
+
 def slow_tail(
     problem: Problem, family: MuscleFamily, blocks: Blocks, fit: Fit
-) -> tuple[MuscleFamily, Fit]:
-    """Return the plant with a share of the pressure that follows slowly, if clearly better.
+) -> tuple[MuscleFamily, Fit] | None:
+    """Return the plant with a share of the pressure that follows slowly, None if hardly better.
 
     Air that flows into dead volumes, or an integrating pilot, gives such a tail.
     """
     plant = family.plant
     if any(plant.value(name) != plant.neutral[name] for name in (TAIL, "regulator.ring_flow")):
-        return family, fit
+        return None
     overdamped = {"regulator.ring_damping": TAIL_DAMPING}
     other = dataclasses.replace(family, plant=plant.replace(overdamped))
     column = column_of(fit, fit.z)
@@ -243,17 +248,16 @@ def slow_tail(
         fits.append(Fit.at_start((*frees, share, turns), column))
     only = of_pressure(problem)
     made = simplest(only, blocks, fits)
-    before = blocks.errors(only.rows(fit.residual))
-    if blocks.gain(before, blocks.errors(only.rows(made.residual))) < TAIL_GAIN:
-        return family, fit
+    if gain_of(only, blocks, fit, made) < TAIL_GAIN:
+        return None
     values = {name: made.values()[name] for name in (TAIL, TAIL_FREQUENCY)}
     return dataclasses.replace(other, plant=other.plant.replace(values)), made
 
 
 def orifices(
     problem: Problem, family: MuscleFamily, blocks: Blocks, fit: Fit, law: Mapping[str, float]
-) -> tuple[MuscleFamily, Fit]:
-    """Return the plant with flow through orifices and its fit, if clearly better than a fit.
+) -> tuple[MuscleFamily, Fit] | None:
+    """Return the plant with flow through orifices and its fit, None if hardly better than a fit.
 
     The muscle, whose volume is filled, is that of the family or one with the parameters ``law``.
     """
@@ -267,9 +271,8 @@ def orifices(
         fits += [Fit.at_start(frees, column) for column in columns]
     only = dataclasses.replace(of_pressure(problem), simulate=other.simulate, tie=other.tie)
     flow = simplest(only, blocks, promising(only, fits), FLOW_ROUNDS)
-    before = blocks.errors(only.rows(fit.residual))
-    if blocks.gain(before, blocks.errors(only.rows(flow.residual))) < FLOW_GAIN:
-        return family, fit
+    if gain_of(only, blocks, fit, flow) < FLOW_GAIN:
+        return None
     return other, flow
 
 
@@ -288,12 +291,16 @@ def simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GU
 
 
 def can_flow(family: MuscleFamily) -> bool:
-    """Return whether the plant of a family may have flow through orifices."""
+    """Return whether flow through orifices may replace the regulator of a family's plant."""
     plant = family.plant
-    return not plant.flowless and all(
-        plant.value(f"regulator.{name}") == plant.neutral[f"regulator.{name}"]
-        for name in REPLACED
-        if name != "pilot_lag" and f"regulator.{name}" in plant.neutral
+    return (
+        plant.air != "flow"
+        and not plant.flowless
+        and all(
+            plant.value(f"regulator.{name}") == plant.neutral[f"regulator.{name}"]
+            for name in REPLACED
+            if name != "pilot_lag" and f"regulator.{name}" in plant.neutral
+        )
     )
 
 

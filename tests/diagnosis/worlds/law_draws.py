@@ -9,6 +9,11 @@ from .laws import MAP_PRESSURE, MAP_SHAPE, MAP_STRAIN, curve
 Constants = tuple[float, ...]
 
 
+def _lock(rng: np.random.Generator, area: float) -> Constants:
+    """Draw stiffness [N] and width of the stop at zero strain (`laws.lock`)."""
+    return rng.uniform(5500.0, 8000.0) * area, rng.uniform(0.008, 0.013)
+
+
 def _exponential(rng: np.random.Generator, area: float) -> Constants:
     top = rng.uniform(370.0, 480.0) * area
     shape = (0.466, 5.17, 0.785) if rng.random() < 0.5 else (0.52, 4.6, 0.66)
@@ -34,8 +39,7 @@ def _sine(rng: np.random.Generator, area: float) -> Constants:
         rng.uniform(370.0, 490.0) * area,
         rng.uniform(0.26, 0.34),
         rng.uniform(0.16, 0.26),
-        rng.uniform(5500.0, 8000.0) * area,
-        rng.uniform(0.008, 0.013),
+        *_lock(rng, area),
     )
 
 
@@ -47,8 +51,7 @@ def _bundle(rng: np.random.Generator, area: float) -> Constants:
         rng.uniform(0.25, 0.32),
         rng.uniform(1.3, 1.7),
         rng.uniform(0.12, 0.2),
-        rng.uniform(5500.0, 8000.0) * area,
-        rng.uniform(0.008, 0.013),
+        *_lock(rng, area),
         rng.uniform(0.015, 0.03),
         0.0,
     )
@@ -118,8 +121,7 @@ def _locking(rng: np.random.Generator, area: float) -> Constants:
         rng.uniform(300.0, 750.0) * area,
         rng.uniform(0.5, 1.5),
         rng.uniform(0.001, 0.003),
-        rng.uniform(5500.0, 8000.0) * area,
-        rng.uniform(0.008, 0.013),
+        *_lock(rng, area),
     )
 
 
@@ -145,8 +147,7 @@ def _capped(rng: np.random.Generator, area: float) -> Constants:
         rng.uniform(0.06, 0.18),
         rng.uniform(250.0, 500.0) * area,
         rng.uniform(2e3, 8e3) * area,
-        rng.uniform(5500.0, 8000.0) * area,
-        rng.uniform(0.008, 0.013),
+        *_lock(rng, area),
     )
 
 
@@ -169,8 +170,7 @@ def _hyperbolic(rng: np.random.Generator, area: float) -> Constants:
         rng.uniform(64.0, 82.0) * area * bend * 6.0 ** (1.0 - power),
         power,
         rng.uniform(2.5e-5, 6.5e-5) / area,
-        rng.uniform(5500.0, 8000.0) * area,
-        rng.uniform(0.008, 0.013),
+        *_lock(rng, area),
     )
 
 
