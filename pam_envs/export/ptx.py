@@ -109,8 +109,8 @@ addresses. `{model.name}_constants.npz` has the arrays that all share.
 
 The last two rows of `counts` are the key words of the seed (`pam_envs.kernels.random.seed_words`).
 
-Arithmetic is in float64 and without fused multiply-add. The code has been assembled but not run
-on a GPU. Compiled for a CPU, the same kernels in the same layout give the bits of pam-envs.
+Arithmetic is in float64 and without fused multiply-add. The kernels are those of
+`gym.make_vec(..., device="cuda")`, whose bits on a GPU are those of pam-envs on a CPU.
 
 {assembly}
 

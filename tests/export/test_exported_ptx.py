@@ -10,6 +10,7 @@ import pytest
 
 from pam_envs.envs.core.step import EPISODE
 from pam_envs.export.command import model_of
+from pam_envs.envs.core.lanes import REGISTERS
 from pam_envs.export.ptx import PARTS, LaneKernel, export_ptx, find_ptxas, layout, ptx_of
 from pam_envs.kernels.build import address_book
 from pam_envs.kernels.machine_code import MachineCode
@@ -84,6 +85,9 @@ def test_ptx_has_one_kernel_that_calls_nothing(small, part: str) -> None:
     text = ptx_of(small.model, part)
     assert re.findall(r"\.visible \.entry (\w+)", text) == [f"{small.model.prefix}_{part}"]
     assert not re.search(r"\.extern \.func", text)
+    assert re.findall(r"\.maxnreg (\d+)", text) == [
+        str(REGISTERS[p]) for p in REGISTERS if p == part
+    ]
 
 
 @pytest.mark.parametrize("part", PARTS)

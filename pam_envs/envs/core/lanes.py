@@ -84,12 +84,14 @@ UNREACHED = {"FAR": 1e38, "EVERYTHING": 1e38}
 """Numbers beyond any input of a hysteresis model, within the range of float32."""
 ARCHITECTURE = "sm_80"
 """Oldest architecture for which PTX is emitted; drivers compile it for newer ones."""
+REGISTERS = {"step": 128}
+"""Most registers of a thread: with fewer than the compiler takes, more threads run at once."""
 _LANE = "pam_lane"
 _GRID = """
 declare i32 @llvm.nvvm.read.ptx.sreg.ctaid.x()
 declare i32 @llvm.nvvm.read.ptx.sreg.ntid.x()
 declare i32 @llvm.nvvm.read.ptx.sreg.tid.x()
-define ptx_kernel void @{name}(ptr %book, i64 %number) {{
+define ptx_kernel void @{name}(ptr %book, i64 %number) {limit}{{
   %block = call i32 @llvm.nvvm.read.ptx.sreg.ctaid.x()
   %size = call i32 @llvm.nvvm.read.ptx.sreg.ntid.x()
   %thread = call i32 @llvm.nvvm.read.ptx.sreg.tid.x()
@@ -168,4 +170,6 @@ class LaneKernel:
         """Return the LLVM IR with one public function, the launch."""
         text = intermediate_of(self).replace(f"@{ENTRY}(", f"@{_LANE}(")
         text = text.replace(f"define void @{_LANE}(", f"define internal void @{_LANE}(")
-        return text + launch.format(name=name, lane=_LANE)
+        registers = REGISTERS.get(self.part)
+        limit = f'"nvvm.maxnreg"="{registers}" ' if registers else ""
+        return text + launch.format(name=name, lane=_LANE, limit=limit)

@@ -1,4 +1,4 @@
-"""A GPU through cuda-core, NVIDIA's binding of the CUDA driver."""
+"""A GPU through cuda-core and cuda-bindings, NVIDIA's bindings of the CUDA driver."""
 
 from typing import Any
 
@@ -126,28 +126,42 @@ class CudaDevice:
     def write(self, array: CudaArray, values: NDArray[Any]) -> None:
         """Overwrite an array of the GPU."""
         if array.nbytes:
-            from cuda.core.utils import StridedMemoryView
-
             source = np.array(values, array.dtype, order="C").reshape(array.shape)
-            array.view.copy_from(
-                StridedMemoryView.from_array_interface(source), self._stream, blocking=True
-            )
+            self._call("cuMemcpyHtoD", array.address, source.ctypes.data, array.nbytes)
 
     def read(self, array: CudaArray) -> NDArray[Any]:
         """Return the values of an array."""
-        from cuda.core.utils import StridedMemoryView
-
         values = np.empty(array.shape, array.dtype)
-        array.view.copy_to(
-            StridedMemoryView.from_array_interface(values), self._stream, blocking=True
-        )
+        if array.nbytes:
+            self._call("cuMemcpyDtoH", values.ctypes.data, array.address, array.nbytes)
         return values
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        """Call a function of the driver for this GPU."""
+        from cuda.bindings import driver
+
+        self._device.set_current()
+        (error,) = getattr(driver, name)(*arguments)
+        if int(error):
+            raise RuntimeError(f"{name} on {self.name}: {getattr(error, 'name', error)}")
 
     def copy(self, array: CudaArray, dtype: DTypeLike | None = None) -> CudaArray:
         """Return a copy in the memory of the GPU."""
         made = self._empty(array.shape, array.dtype if dtype is None else dtype)
-        made.part.copy_from(array.part, stream=self._stream)
+        self._copy(made, array.address)
         return made
+
+    def _copy(self, array: CudaArray, source: int) -> None:
+        """Queue a copy from an address of the GPU."""
+        if array.nbytes:
+            stream = int(self._stream.handle)
+            self._call("cuMemcpyDtoDAsync", array.address, source, array.nbytes, stream)
+
+    def tensor(self, array: CudaArray) -> Any:
+        """Return a tensor of torch in the memory of an array."""
+        import torch
+
+        return torch.as_tensor(array, device=self.name)
 
     def take(self, array: CudaArray, given: Any) -> None:
         """Overwrite an array with one of another library, of the same shape and type."""
@@ -159,7 +173,12 @@ class CudaDevice:
                 f"actions of shape {source.shape} and type {source.dtype}, expected {array.shape} "
                 f"of {array.dtype}; convert them, or install torch, whose tensors are converted"
             )
-        array.view.copy_from(source, self._stream)
+        if source.strides not in (None, _strides(array.shape)):
+            raise ValueError(
+                f"actions with strides {source.strides}, expected {_strides(array.shape)} (rows "
+                "one after the other); give a contiguous copy"
+            )
+        self._copy(array, source.ptr)
 
     def address(self, array: CudaArray) -> int:
         """Return the address of an array."""
@@ -189,3 +208,8 @@ class CudaDevice:
         """Wait until all earlier work is done."""
         self._device.set_current()
         self._stream.sync()
+
+
+def _strides(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the strides, in elements, of an array whose rows are one after the other."""
+    return tuple(int(np.prod(shape[i + 1 :])) for i in range(len(shape)))

@@ -34,6 +34,9 @@ class Device(Protocol):
     def take(self, array: Any, given: Any) -> None:
         """Overwrite an array with one of another library, which it gives by DLPack."""
 
+    def tensor(self, array: Any) -> Any:
+        """Return a tensor of torch in the memory of an array."""
+
     def address(self, array: Any) -> int:
         """Return the address of an array."""
 
@@ -72,6 +75,12 @@ class HostDevice:
     def take(self, array: NDArray[Any], given: Any) -> None:
         """Overwrite an array with one of another library."""
         array[...] = np.from_dlpack(given)
+
+    def tensor(self, array: NDArray[Any]) -> Any:
+        """Return a tensor of torch in the memory of an array."""
+        import torch
+
+        return torch.from_numpy(array)
 
     def address(self, array: NDArray[Any]) -> int:
         """Return the address."""

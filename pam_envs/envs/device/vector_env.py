@@ -88,6 +88,8 @@ class DeviceVectorEnv(Batch):
         self.with_info = bool(info)
         self._torch = _torch()
         self._arrays = {name: self.device.upload(a) for name, a in self._initial().items()}
+        shared = () if self._torch is None else ("actions", "observations", "report", "flags")
+        self._tensors = {name: self.device.tensor(self._arrays[name]) for name in shared}
         book = np.zeros((len(BOOK), 4), np.int64)
         for row, name in zip(book, BOOK, strict=True):
             array = self._arrays[name]
@@ -166,7 +168,7 @@ class DeviceVectorEnv(Batch):
             if tuple(actions.shape) != array.shape:
                 raise ValueError(f"actions of shape {tuple(actions.shape)}, expected {array.shape}")
             if torch is not None and isinstance(actions, torch.Tensor):
-                torch.from_dlpack(array).copy_(actions)
+                self._tensors["actions"].copy_(actions)
             else:
                 self.device.take(array, actions)
         else:
@@ -177,8 +179,10 @@ class DeviceVectorEnv(Batch):
 
     def _give(self, name: str, dtype: Any = None) -> Any:
         """Return a copy of an array for the caller."""
-        copy = self.device.copy(self._arrays[name], dtype)
-        return copy if self._torch is None else self._torch.from_dlpack(copy)
+        if self._torch is None:
+            return self.device.copy(self._arrays[name], dtype)
+        tensor = self._tensors[name]
+        return (tensor.view(self._torch.bool) if dtype is np.bool_ else tensor).clone()
 
     def values(self, name: str) -> NDArray[Any]:
         """Return the present values of an array of the address book, once all steps are done."""

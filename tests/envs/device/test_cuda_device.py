@@ -27,7 +27,13 @@ def driver(monkeypatch: pytest.MonkeyPatch) -> None:
     def compiled(self: CudaDevice, kernel: LaneKernel) -> Any:
         return load(kernel.object_code(host()))
 
+    def tensor(self: CudaDevice, array: CudaArray) -> Any:
+        import torch
+
+        return torch.from_numpy(array.view.array)
+
     monkeypatch.setattr(CudaDevice, "compiled", compiled)
+    monkeypatch.setattr(CudaDevice, "tensor", tensor)
 
 
 @pytest.mark.parametrize("with_torch", [True, False])
@@ -95,6 +101,16 @@ def test_actions_of_another_library_are_taken(monkeypatch: pytest.MonkeyPatch) -
     assert np.array_equal(device.read(array), np.ones((3, 2)))
     with pytest.raises(ValueError, match=r"float32.*expected"):
         device.take(array, CudaArray(given._buffer, (3, 2), np.float32))
+    with pytest.raises(ValueError, match=r"strides \(1, 3\), expected \(2, 1\)"):
+        device.take(array, np.ones((2, 3)).T)
+
+
+def test_error_of_the_driver_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    device = CudaDevice()
+    driver = sys.modules["cuda.bindings"].driver
+    monkeypatch.setattr(driver, "cuMemcpyHtoD", lambda *given: (2,))
+    with pytest.raises(RuntimeError, match="cuMemcpyHtoD on cuda:0: 2"):
+        device.upload(np.zeros(3))
 
 
 def test_missing_gpu_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
