@@ -28,6 +28,10 @@ Changes = Annotated[
     tuple[str, ...],
     tyro.conf.arg(help="Single settings, for example: --set ppo.gamma=0.95 network.hidden=[32,32]"),
 ]
+Processor = Annotated[
+    Literal["cpu", "cuda"],
+    tyro.conf.arg(help="Where networks learn; cuda needs a GPU and PyTorch's build for it."),
+]
 DEFAULT_ENV = "PAM/MusclePositioning-v0"
 COLUMNS = ("value", "rms", "return", "travel", "failures")
 
@@ -45,6 +49,7 @@ def train(
     resume: bool = False,
     config: Path | None = None,
     set: Changes = (),
+    device: Processor = "cpu",
 ) -> None:
     """Train a policy and export it as ONNX.
 
@@ -69,7 +74,7 @@ def train(
     def fresh() -> Run:
         settings = _settings(name, kind, variant, config)
         changes = [*set, *([] if steps is None else [f"steps={steps}"])]
-        return Run(configs.changed(settings, changes), number, folder)
+        return Run(configs.changed(settings, changes), number, folder, device)
 
     if not resume:
         run = fresh()
@@ -84,7 +89,7 @@ def train(
                 f"this command: {run.command()}"
             )
         if resume:
-            run = training.saved_run(folder, steps)
+            run = training.saved_run(folder, steps, device)
             if config is not None or set:
                 raise SettingsError(
                     "--resume keeps the settings of the run (only --steps may change); leave "
@@ -137,6 +142,7 @@ def sweep(
     first_seed: int = 0,
     steps: Steps = None,
     set: Changes = (),
+    device: Processor = "cpu",
     jobs: int = os.cpu_count() or 1,
     backend: Literal["loky", "dask"] = "loky",
     address: str = "",
@@ -169,6 +175,7 @@ def sweep(
         range(first_seed, first_seed + seeds),
         out,
         f"{algo}-{variant}" if variant else algo,
+        device,
     )
     if dry_run:
         for training in trainings:

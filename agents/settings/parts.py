@@ -154,6 +154,9 @@ class Cost:
     action_rate: float = number(0.0, 0.0, 1e5)
     # cost of each control period that a limit cut off, where the environment has no reward/ended
     ended: float = number(0.0, 0.0, 1e5)
+    # divide by the mean cost of the errors of each kind of rows so far, so that kinds with large
+    # errors do not outweigh those with small ones
+    relative: bool = False
 
 
 @dataclass(frozen=True)

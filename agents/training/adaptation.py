@@ -35,7 +35,7 @@ def student_config(config: Config) -> Config:
 
 def untrained(teacher: Any, config: Config, seed: int) -> PPO:
     """Return an untrained student in the environment of its teacher."""
-    student: Any = make_model(student_config(config), seed, teacher.get_env())
+    student: Any = make_model(student_config(config), seed, teacher.get_env(), teacher.device.type)
     student.set_logger(teacher.logger)
     return student  # type: ignore[no-any-return]
 
@@ -69,13 +69,15 @@ def learn(
         inputs, targets, observation = _round(
             teacher, student, env, observation, led, settings.n_steps
         )
-        batch = torch.from_numpy(inputs[:, :seen]), torch.from_numpy(targets)
+        batch = tuple(
+            torch.from_numpy(part).to(student.device) for part in (inputs[:, :seen], targets)
+        )
         with torch.no_grad():
             losses.append(float(_error(policy, *batch)))
         for _ in range(settings.n_epochs):
             order = random.permutation(len(targets))
             for at in range(0, len(order), settings.batch_size):
-                rows = torch.from_numpy(order[at : at + settings.batch_size])
+                rows = torch.from_numpy(order[at : at + settings.batch_size]).to(student.device)
                 error: Any = _error(policy, *(part[rows] for part in batch))
                 optimiser.zero_grad()
                 error.backward()
@@ -111,9 +113,9 @@ def _round(
     inputs, targets = [], []
     space = teacher.action_space
     for _ in range(steps):
-        at = torch.from_numpy(observation)
-        wanted = np.clip(_mean(teacher.policy, at).numpy(), space.low, space.high)
-        own = np.clip(_mean(student.policy, at).numpy(), space.low, space.high)
+        at = torch.from_numpy(observation).to(student.device)
+        wanted = np.clip(_mean(teacher.policy, at).cpu().numpy(), space.low, space.high)
+        own = np.clip(_mean(student.policy, at).cpu().numpy(), space.low, space.high)
         inputs.append(observation)
         targets.append(wanted)
         observation = np.asarray(env.step(np.where(led[:, None], wanted, own))[0])

@@ -74,8 +74,17 @@ def controller_plants(config: Config, env: VecEnv) -> list[Any]:
     ]
 
 
-def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
-    """Return the untrained model of a run, with all random generators seeded."""
+def make_model(config: Config, seed: int, env: VecEnv, device: str = "cpu") -> BaseAlgorithm:
+    """Return the untrained model of a run, with all random generators seeded.
+
+    Its networks are on ``device``, "cpu" or "cuda"; the environment runs on the processor. A
+    SettingsError says that PyTorch finds no GPU.
+    """
+    if device != "cpu" and not torch.cuda.is_available():
+        raise SettingsError(
+            f"device = {device!r}, but PyTorch {torch.__version__} finds no GPU; install its build "
+            "for CUDA and the GPU's driver, or leave --device out"
+        )
     torch.set_num_threads(1)
     random.seed(seed)
     arguments = {k: v for k, v in vars(config.chosen).items() if k not in OWN}
@@ -84,7 +93,7 @@ def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
     arguments |= policy_arguments(config, *signals_of(env), widths)
     rate = learning_rate(config)
     made = ALGORITHMS[config.algo]
-    model = made(env=env, learning_rate=rate, seed=seed, device="cpu", **arguments)
+    model = made(env=env, learning_rate=rate, seed=seed, device=device, **arguments)
     if config.residual.controller:
         silence(model.policy)
     env.seed(seeds.first_training(seed))

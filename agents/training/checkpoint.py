@@ -65,13 +65,15 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def tensors(value: Any) -> Any:
-    """Return the content with arrays as tensors, which need no code to read."""
+    """Return the content with arrays as tensors of the processor, which need no code to read."""
     if isinstance(value, (np.ndarray, np.generic)):
         return torch.from_numpy(np.array(value))
     if isinstance(value, dict):
         return {key: tensors(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
         return [tensors(entry) for entry in value]
-    if value is None or isinstance(value, (bool, int, float, str, torch.Tensor)):
+    if isinstance(value, torch.Tensor):
+        return value.cpu()
+    if value is None or isinstance(value, (bool, int, float, str)):
         return value
     raise TypeError(f"a checkpoint holds no {type(value).__name__}")

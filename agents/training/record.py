@@ -11,6 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import torch
+
 import agents
 import baselines
 import pam_envs
@@ -35,12 +37,14 @@ CPU_FILE = Path("/proc/cpuinfo")
 class Run:
     """A training run in an absolute folder; ``seed`` is that of weights, exploration and episodes.
 
-    Workers of a cluster that share the folder continue from each other's checkpoints.
+    Workers of a cluster that share the folder continue from each other's checkpoints. ``device``
+    holds the networks, "cpu" or "cuda".
     """
 
     config: Config
     seed: int
     folder: Path
+    device: str = "cpu"
 
     @property
     def checkpoint(self) -> Path:
@@ -50,7 +54,8 @@ class Run:
     @property
     def key(self) -> str:
         """Digest of settings, seed, folder, package versions and code; workers must agree."""
-        parts = [self.config.as_dict(), self.seed, str(self.folder), versions_of(PACKAGES), code()]
+        own = [self.config.as_dict(), self.seed, str(self.folder), self.device]
+        parts = [*own, versions_of(PACKAGES), code()]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:32]
 
     def finished(self) -> bool:
@@ -74,6 +79,8 @@ class Run:
             words += ["--config", POLICY]
         elif variant:
             words += ["--variant", variant]
+        if self.device != "cpu":
+            words += ["--device", self.device]
         return " ".join(words)
 
     def _variant(self) -> str | None:
@@ -112,15 +119,16 @@ class Clock:
         }
 
 
-def hardware() -> str:
-    """Return processor and number of cores of this machine in words."""
+def hardware(device: str = "cpu") -> str:
+    """Return processor and number of cores of this machine in words, and the GPU if it is used."""
     model = platform.processor() or platform.machine()
     try:
         lines = CPU_FILE.read_text(encoding="utf-8").splitlines()
         model = next(li.partition(":")[2].strip() for li in lines if li.startswith("model name"))
     except (OSError, StopIteration):
         pass
-    return f"{model} ({platform.machine()}), {os.cpu_count() or 1} cores, one used"
+    made = f"{model} ({platform.machine()}), {os.cpu_count() or 1} cores, one used"
+    return made if device == "cpu" else f"{made}; {torch.cuda.get_device_name(device)}"
 
 
 def cost(run: Run, spent: dict[str, float], steps: int) -> dict[str, Any]:
@@ -134,7 +142,7 @@ def cost(run: Run, spent: dict[str, float], steps: int) -> dict[str, Any]:
         "seconds": round(spent["wall"], 1),
         "cpu_seconds": round(spent["cpu"], 1),
         "frames_per_second": round(steps / max(spent["wall"], 1e-9)),
-        "hardware": hardware(),
+        "hardware": hardware(run.device),
         "seed": run.seed,
         "first_env_seed": seeds.first_training(run.seed),
         "tuning_seeds": [seeds.TUNING, max(run.config.evaluation.episodes, 0)],

@@ -32,7 +32,7 @@ ARRAYS: dict[type[VecEnv], tuple[str, ...]] = {
     VecMonitor: ("episode_returns", "episode_lengths"),
     VecNormalize: ("returns", "old_obs", "old_reward"),
     HistoryVecEnv: ("past", "last"),
-    CostVecEnv: ("before", "started"),
+    CostVecEnv: ("before", "started", "totals", "periods"),
 }
 """Arrays of the wrappers' states."""
 OWN = (ResidualVecEnv, WideningVecEnv, PrivilegedVecEnv)

@@ -20,11 +20,15 @@ LOG = "log.txt"
 
 
 def trainings(
-    configurations: Sequence[Config], seeds: Sequence[int], out: Path, name: str
+    configurations: Sequence[Config],
+    seeds: Sequence[int],
+    out: Path,
+    name: str,
+    device: str = "cpu",
 ) -> list[Run]:
     """Return each configuration with each seed, in folders ``name``-seed below ``out``."""
     return [
-        Run(config, seed, folder_of(out.resolve(), config.env, name, seed))
+        Run(config, seed, folder_of(out.resolve(), config.env, name, seed), device)
         for config in configurations
         for seed in seeds
     ]

@@ -62,19 +62,22 @@ def start(run: Run) -> BaseAlgorithm:
         )
     run.folder.mkdir(parents=True, exist_ok=True)
     checkpoint.sweep(run.folder)
-    model = make_model(run.config, run.seed, make_env(run.config))
+    model = make_model(run.config, run.seed, make_env(run.config), run.device)
     if run.config.residual.controller:
         facts(model)
     return model
 
 
-def saved_run(folder: Path, steps: int | None = None) -> Run:
-    """Return the run of a folder's checkpoint, with another number of steps if given."""
+def saved_run(folder: Path, steps: int | None = None, device: str = "cpu") -> Run:
+    """Return the run of a folder's checkpoint, with another number of steps if given.
+
+    It goes on with its networks on ``device``.
+    """
     settings = _settings(checkpoint.load(folder / CHECKPOINT))
     given = settings["config"]
     if steps is not None:
         given = {**given, "steps": steps}
-    return Run(configs.from_mapping(given), settings["seed"], folder)
+    return Run(configs.from_mapping(given), settings["seed"], folder, device)
 
 
 def _settings(content: dict[str, Any]) -> dict[str, Any]:
@@ -97,7 +100,7 @@ def resume(run: Run) -> BaseAlgorithm:
         raise CheckpointError(
             f"the run was trained on the plants {then}, which are now {now}; train anew"
         )
-    model = make_model(run.config, run.seed, env)
+    model = make_model(run.config, run.seed, env, run.device)
     model.ep_info_buffer = None
     try:
         snapshot.restore(model, content["snapshot"])
@@ -181,7 +184,7 @@ def train_to_the_end(run: Run, console: Console) -> Path:
     """Start or continue a run unless its policy is finished; return the policy's path."""
     if not run.checkpoint.exists():
         return train(run, start(run), console)
-    if saved_run(run.folder) != run:
+    if saved_run(run.folder, device=run.device) != run:
         raise CheckpointError(
             f"{run.folder} holds a training with other settings; give another --out"
         )

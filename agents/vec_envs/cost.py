@@ -10,6 +10,8 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 from agents.settings.parts import Cost
 
 EFFORT, ENDED = "reward/effort", "reward/ended"
+SMALLEST = 1e-6
+"""Least mean cost that a reward is divided by."""
 
 
 class CostVecEnv(VecEnvWrapper):
@@ -19,6 +21,9 @@ class CostVecEnv(VecEnvWrapper):
     up to ``t = quadratic = d``, and ``-(2 d t - d**2)`` beyond, which is never below ``-2 d t``.
     ``reward/ended``, the sum of the lowest possible rewards of the remaining periods, is therefore
     multiplied by ``2 d``. ``venv`` is a :class:`agents.vec_envs.batch.BatchVecEnv`.
+
+    With ``cost.relative`` the reward of a row is divided by the mean cost of the errors of its kind
+    of rows so far.
     """
 
     def __init__(self, venv: VecEnv, cost: Cost) -> None:
@@ -38,6 +43,8 @@ class CostVecEnv(VecEnvWrapper):
         self.action = np.zeros((venv.num_envs, *space.shape), np.float32)
         self.before = np.zeros_like(self.action)
         self.started = np.zeros(venv.num_envs, np.bool_)  # whether ``before`` is of this episode
+        self.totals = np.zeros(len(base.slices))  # cost of the errors, by kind of rows
+        self.periods = np.zeros(len(base.slices))
 
     def reset(self) -> NDArray[np.float32]:
         """Start all episodes; see stable-baselines3."""
@@ -53,7 +60,8 @@ class CostVecEnv(VecEnvWrapper):
         """Step all rows; see stable-baselines3."""
         observation, _, done, infos = self.venv.step_wait()
         last = self.base.last
-        made = sum(-self._error_cost(-last[name]) for name in self.errors) + last[EFFORT]
+        errors = np.sum([self._error_cost(-last[name]) for name in self.errors], axis=0)
+        made = last[EFFORT] - errors
         change = (self.action - self.before) / (self.high - self.low)
         moved = np.square(change, dtype=np.float64).sum(axis=1)
         made = made - self.cost.action_rate * np.where(self.started, moved, 0.0)
@@ -61,8 +69,17 @@ class CostVecEnv(VecEnvWrapper):
             made = made + max(2.0 * self.cost.quadratic, 1.0) * last[ENDED]
         elif self.cost.ended:
             made = made - self.cost.ended * self._cut_off(done, infos)
+        if self.cost.relative:
+            made = made / self._mean(errors)
         self.before, self.started = self.action, ~done
         return observation, made.astype(np.float32), done, infos
+
+    def _mean(self, errors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the mean cost of the errors of each row's kind, with the present period."""
+        sizes = [rows.stop - rows.start for rows in self.base.slices]
+        self.totals += [errors[rows].sum() for rows in self.base.slices]
+        self.periods += sizes
+        return np.repeat(np.maximum(self.totals / self.periods, SMALLEST), sizes)
 
     def _error_cost(self, size: NDArray[np.float64]) -> NDArray[np.float64]:
         limit = self.cost.quadratic

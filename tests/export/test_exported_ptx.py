@@ -8,9 +8,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from pam_envs.envs.core.lanes import REGISTERS
 from pam_envs.envs.core.step import EPISODE
 from pam_envs.export.command import model_of
-from pam_envs.envs.core.lanes import REGISTERS
 from pam_envs.export.ptx import PARTS, LaneKernel, export_ptx, find_ptxas, layout, ptx_of
 from pam_envs.kernels.build import address_book
 from pam_envs.kernels.machine_code import MachineCode

@@ -47,7 +47,7 @@ def test_robust_presets_have_drawn_everyday_and_a_quarter_of_nominal_plants(name
     drawn = [kind.get("randomize", False) for kind in config.kinds()]
     assert drawn.count(False) >= len(drawn) / 4
     assert {True, "everyday"} <= set(drawn)
-    assert config.cost.quadratic > 0.0
+    assert config.cost.quadratic > 0.0 or config.cost.relative
     assert config.cost.action_rate > 0.0
     assert config.privileged.critic
     for kind in config.kinds()[: len(config.mix)]:

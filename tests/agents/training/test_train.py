@@ -25,6 +25,7 @@ from agents.policies.policy_file import finished
 from agents.settings import presets as configs
 from agents.settings import seeds
 from agents.settings.parts import Evaluation
+from agents.settings.schema import SettingsError
 from agents.training import checkpoint, record, train
 from agents.training.building import make_env, make_model
 from agents.training.checkpoint import MARK, CheckpointError
@@ -354,3 +355,11 @@ def test_checkpoint_with_a_state_beyond_its_bounds_is_refused(key, value, tmp_pa
     checkpoint.save(tmp_path / CHECKPOINT, content)
     assert main(["train", ID, "--resume", "--out", str(tmp_path)]) == 2
     assert "does not fit its settings" in capsys.readouterr().err
+
+
+def test_gpu_that_is_missing_is_named_with_its_remedy(tmp_path, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    run = Run(kind("ppo"), 3, tmp_path, "cuda")
+    assert run.command().endswith("--device cuda")
+    with pytest.raises(SettingsError, match=r"device = 'cuda'.*no GPU.*--device"):
+        train.start(run)

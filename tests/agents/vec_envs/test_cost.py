@@ -101,3 +101,22 @@ def test_cut_off_periods_cost_where_the_environment_has_no_term():
     left = 1001 - steps  # periods of an episode of 10 s, with the last one
     assert left > 100
     assert free[0] - paid[0] == pytest.approx(2.0 * left, rel=1e-3)
+
+
+def test_relative_costs_are_shares_of_the_mean_of_each_kind_of_rows():
+    kinds = ({"load": 0.35}, {"load": 3.5})
+    own = {name: value for name, value in SHORT.items() if name != "load"}
+    made: list[np.ndarray] = []
+    for relative in (False, True):
+        cost = Cost(relative=relative)
+        env = CostVecEnv(make_batch_vec_env(ID, N, *kinds, **own), cost)
+        env.seed(SEED)
+        env.reset()
+        rewards, errors = [], []
+        for _ in range(STEPS):
+            rewards.append(env.step(np.zeros((2 * N, 1), np.float32))[1])
+            errors.append(-env.base.last["reward/tracking"])
+        made.append(np.array(rewards))
+    for rows in (slice(0, N), slice(N, 2 * N)):
+        mean = np.cumsum(np.array(errors)[:, rows].mean(axis=1)) / np.arange(1, STEPS + 1)
+        assert made[1][:, rows] == pytest.approx(made[0][:, rows] / mean[:, None], rel=1e-5)
