@@ -1,6 +1,6 @@
 """Write the object code of default configurations into the package, before a wheel is built.
 
-``python -m pam_envs.export.shipping``: for Linux on x86-64, see :mod:`pam_envs.kernels.shipped`.
+``python -m pam_envs.export.shipping``: for all platforms of :mod:`pam_envs.kernels.shipped`.
 """
 
 from collections.abc import Iterator
@@ -31,13 +31,13 @@ def sources() -> Iterator[Source]:
 def main() -> None:
     """Write the folder of object files."""
     register_all()
-    target = Target(shipped.TRIPLE, shipped.CPU, jit=True)
-    codes = []
-    for source in sources():
-        kernel = source.by_address
-        codes.append((kernel, emit(intermediate_of(source), target)))
-        print(f"{kernel.name}: {len(codes[-1][1]) / 1e3:.0f} kB", flush=True)
-    shipped.write(codes)
+    kernels = [(source.by_address, intermediate_of(source)) for source in sources()]
+    codes = {}
+    for name, platform in shipped.PLATFORMS.items():
+        target = Target(platform.triple, platform.cpu, jit=True)
+        codes[name] = {kernel.name: emit(text, target) for kernel, text in kernels}
+        print(f"{name}: {sum(map(len, codes[name].values())) / 1e3:.0f} kB", flush=True)
+    shipped.write(codes, [kernel for kernel, _ in kernels])
 
 
 if __name__ == "__main__":

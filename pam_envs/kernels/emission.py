@@ -1,7 +1,8 @@
 """Object code and assembly of LLVM IR for any processor.
 
-The code calls nothing but ``memset`` and ``memcpy``. No target fuses a multiplication with an
-addition, because the IR does not allow it: all of them compute the same bits.
+The code calls nothing but ``memset`` and ``memcpy`` (``bzero`` on macOS), and on Windows the stack
+probe ``__chkstk``: every process has them. No target fuses a multiplication with an addition,
+because the IR does not allow it: all of them compute the same bits.
 """
 
 import re

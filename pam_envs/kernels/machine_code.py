@@ -118,8 +118,15 @@ class MachineCode:
     def _stored(self) -> Run | None:
         """Return code that was shipped with the package or cached on this machine."""
         kernel = self._source.by_address
-        data = shipped.find(kernel)
-        data = read_whole(kernel.object_file()) if data is None else data
+        try:
+            data = shipped.find(kernel)
+            if data is not None:
+                return load(data)
+        except Exception as error:  # whatever it is, the kernel can be compiled here
+            announce(
+                f"the shipped code of {kernel.name} cannot be used and is compiled here: {error!r}"
+            )
+        data = read_whole(kernel.object_file())
         return None if data is None else load(data)
 
     def _compiled(self) -> bytes:
@@ -170,7 +177,13 @@ def waiting() -> bool:
 
 
 def load(data: bytes) -> Run:
-    """Return the function of an object file, which releases the lock of the interpreter."""
+    """Return the function of an object file, which releases the lock of the interpreter.
+
+    Raises
+    ------
+    RuntimeError
+        If it is no object file of this platform, or has no such function.
+    """
     import llvmlite.binding as llvm
 
     from pam_envs.kernels.emission import host
@@ -182,11 +195,15 @@ def load(data: bytes) -> Run:
     )
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     code = llvm.object_file.ObjectFileRef.from_data(data)
+    if not code._ptr:  # otherwise the loader crashes
+        raise RuntimeError("the data are no object file")
     engine.add_object_file(code)
     engine.finalize_object()
     _LOADED.append((engine, code, machine))
-    signature = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)
-    return signature(engine.get_function_address(ENTRY))
+    address = engine.get_function_address(ENTRY)
+    if not address:
+        raise RuntimeError(f"the object code has no function {ENTRY}")
+    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)(address)
 
 
 def is_busy(mark: Path) -> bool:

@@ -1,18 +1,17 @@
-"""Object code of default configurations that is part of the wheel.
+"""Object code of default configurations that is part of the wheel, for six platforms.
 
-The wheel for every platform holds code for Linux on x86-64 with AVX2; others compile. A manifest
-holds the digest of the sources from which the code was made. It is used only if the installed
+A platform is an operating system with a processor; others compile. A manifest holds the digests of
+the sources from which the code was made and of the files. Code is used only if the installed
 sources, the functions of the kernel and the values that they read are the same.
 """
 
 import hashlib
 import json
-import platform
-import sys
-from collections.abc import Iterable, Mapping
+import shutil
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pam_envs.kernels.build import INTRINSICS
 from pam_envs.kernels.rebind import graph_digest, place
@@ -23,21 +22,66 @@ if TYPE_CHECKING:
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDER = Path(__file__).resolve().parent / "objects"
 MANIFEST = "manifest.json"
-TRIPLE, CPU = "x86_64-unknown-linux-gnu", "x86-64-v3"
-NEEDED = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
-"""Features of the processor that the code uses."""
+BESIDE = ("agents", "baselines", "sweeps")
+"""Folders that are in the package only in the wheel (``hatch_build.py``); they hold no kernels."""
+
+
+class Platform(NamedTuple):
+    """Operating system and processor, in LLVM's terms."""
+
+    triple: str
+    cpu: str
+    needed: tuple[str, ...] = ()
+    """Features of the processor that the code uses, and that not every one of its kind has."""
+
+
+AVX2 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+PLATFORMS = {
+    "linux-x86_64": Platform("x86_64-unknown-linux-gnu", "x86-64-v3", AVX2),
+    "linux-arm64": Platform("aarch64-unknown-linux-gnu", "generic"),
+    "macos-x86_64": Platform("x86_64-apple-darwin20.0.0", "x86-64-v3", AVX2),
+    "macos-arm64": Platform("arm64-apple-darwin20.0.0", "apple-m1"),
+    "windows-x86_64": Platform("x86_64-pc-windows-msvc", "x86-64-v3", AVX2),
+    "windows-arm64": Platform("aarch64-pc-windows-msvc", "generic"),
+}
+"""Platforms of the code, which are also the names of its folders."""
+PROCESSORS = {"x86_64": "x86_64", "aarch64": "arm64", "arm64": "arm64"}
+SYSTEMS = {"linux": "linux", "darwin": "macos", "macosx": "macos", "windows-msvc": "windows"}
+"""Parts of the names of platforms, by what LLVM calls them."""
+
+
+def platform_of(triple: str) -> str | None:
+    """Return the platform of a process; None if no code is shipped for it."""
+    processor, _, rest = triple.partition("-")
+    system = next((own for part, own in SYSTEMS.items() if part in rest), None)
+    name = f"{system}-{PROCESSORS.get(processor)}"
+    return name if name in PLATFORMS else None
+
+
+def supported(platform: str) -> bool:
+    """Return whether this processor has the features that the code of a platform uses."""
+    import llvmlite.binding as llvm
+
+    needed = PLATFORMS[platform].needed
+    return not needed or all(map(llvm.get_host_cpu_features().get, needed))
 
 
 def find(kernel: "AddressKernel") -> bytes | None:
     """Return the object code of a kernel, or None if none was shipped for it or it has changed."""
-    entry = _codes().get(kernel.name)
+    platform, codes = _codes()
+    entry = codes.get(kernel.name)
     if entry is None or entry["kernel"] != located(kernel):
         return None
     try:
-        data = (FOLDER / entry["file"]).read_bytes()
+        data = file_of(FOLDER, platform, kernel.name).read_bytes()
     except OSError:
         return None
-    return data if hashlib.sha256(data).hexdigest() == entry["sha256"] else None
+    return data if hashlib.sha256(data).hexdigest() == entry["sha256"].get(platform) else None
+
+
+def file_of(folder: Path, platform: str, name: str) -> Path:
+    """Return the file of a kernel's object code."""
+    return folder / platform / f"{name}.o"
 
 
 def located(kernel: "AddressKernel") -> str:
@@ -57,41 +101,43 @@ def located(kernel: "AddressKernel") -> str:
 def sources() -> str:
     """Return the digest of the package's Python files."""
     found = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        found.update(path.relative_to(PACKAGE).as_posix().encode())
-        found.update(path.read_bytes())
+    files = {path.relative_to(PACKAGE): path for path in PACKAGE.rglob("*.py")}
+    for inside, path in sorted(files.items(), key=lambda item: item[0].as_posix()):
+        if inside.parts[0] not in BESIDE:
+            found.update(inside.as_posix().encode())
+            found.update(path.read_bytes())
     return found.hexdigest()
 
 
-def write(codes: Iterable[tuple["AddressKernel", bytes]], folder: Path = FOLDER) -> None:
-    """Write object files and their manifest."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.iterdir():
-        old.unlink()
+def write(
+    codes: Mapping[str, Mapping[str, bytes]],
+    kernels: Sequence["AddressKernel"],
+    folder: Path = FOLDER,
+) -> None:
+    """Write the object code of kernels for each platform, by their names, and the manifest."""
+    shutil.rmtree(folder, ignore_errors=True)
     entries: dict[str, Any] = {}
-    for kernel, data in codes:
-        file = f"{kernel.name}.o"
-        (folder / file).write_bytes(data)
-        digest = hashlib.sha256(data).hexdigest()
-        entries[kernel.name] = {"file": file, "sha256": digest, "kernel": located(kernel)}
+    for kernel in kernels:
+        digests = {}
+        for platform, of in codes.items():
+            file = file_of(folder, platform, kernel.name)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(of[kernel.name])
+            digests[platform] = hashlib.sha256(of[kernel.name]).hexdigest()
+        entries[kernel.name] = {"kernel": located(kernel), "sha256": digests}
     manifest = {"sources": sources(), "codes": entries}
     (folder / MANIFEST).write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
 
 
-def supported() -> bool:
-    """Return whether this processor runs the shipped code."""
-    if sys.platform != "linux" or platform.machine() not in ("x86_64", "AMD64"):
-        return False
+@lru_cache(maxsize=1)
+def _codes() -> tuple[str, Mapping[str, Any]]:
+    """Return the platform and the manifest's entries, none of other platforms and sources."""
+    if not (FOLDER / MANIFEST).exists():
+        return "", {}
     import llvmlite.binding as llvm
 
-    features = llvm.get_host_cpu_features()
-    return all(features.get(name) for name in NEEDED)
-
-
-@lru_cache(maxsize=1)
-def _codes() -> Mapping[str, Any]:
-    """Return the entries of the manifest, none on other processors and for other sources."""
-    if not (FOLDER / MANIFEST).exists() or not supported():
-        return {}
+    platform = platform_of(llvm.get_process_triple())
+    if platform is None or not supported(platform):
+        return "", {}
     manifest = json.loads((FOLDER / MANIFEST).read_text(encoding="utf-8"))
-    return manifest["codes"] if manifest["sources"] == sources() else {}
+    return platform, manifest["codes"] if manifest["sources"] == sources() else {}

@@ -1,9 +1,9 @@
 """Intended motion of a wearer: minimum-jerk reaches, sines, or rest.
 
-Every motion is a function of time and of a few constants that are drawn when an episode begins, so
-that a preview is an evaluation at a later time. Reaches run from one drawn place to the next, one
-in each window of equal duration, with a rest before it, at minimum jerk (T. Flash, N. Hogan, The
-coordination of arm movements, J. Neuroscience 5 (1985)).
+Every motion is a function of time, of the key of an episode's random numbers and of a few constants
+that are drawn when it begins, so that a preview is an evaluation at a later time. Reaches run from
+one drawn place to the next, one in each window of equal duration, with a rest before it, at minimum
+jerk (T. Flash, N. Hogan, The coordination of arm movements, J. Neuroscience 5 (1985)).
 """
 
 from typing import Any
@@ -16,10 +16,10 @@ from pam_envs.references.path import least_jerk
 MOTIONS = ("reaches", "sines", "still", "mixed")
 REACHES, SINES, STILL, MIXED = range(len(MOTIONS))
 
-KIND, KEY_A, KEY_B, LOW, SPAN, WINDOW, FIRST, SIZE_1, RATE_1, SIZE_2, RATE_2 = range(11)
-ROWS = 11
-"""Rows of one motion: its kind, the words of the random key, the range, seconds of a window, the
-place where it begins, and size and frequency [Hz] of two sines."""
+KIND, LOW, SPAN, WINDOW, FIRST, SIZE_1, RATE_1, SIZE_2, RATE_2 = range(9)
+ROWS = 9
+"""Rows of one motion: its kind, the range, seconds of a window, the place where it begins, and size
+and frequency [Hz] of two sines."""
 
 STREAM = 36  # random stream of motions: the first draws are of the constants, then three a window
 FIRST_WINDOW = 16
@@ -42,27 +42,27 @@ def least_jerk_bend(share: float) -> float:
 
 
 @kernel
-def place_of(rows: Any, base: int, lane: int, window: int) -> float:
+def place_of(rows: Any, base: int, lane: int, key_a: int, key_b: int, window: int) -> float:
     """Return the place at which the reach of a window ends and the next one begins."""
     if window < 0:
         return rows[base + FIRST][lane]  # type: ignore[no-any-return]
-    key_a, key_b = int(rows[base + KEY_A][lane]), int(rows[base + KEY_B][lane])
     u = uniform(key_a, key_b, STREAM, FIRST_WINDOW + 3 * window)
     return rows[base + LOW][lane] + rows[base + SPAN][lane] * u  # type: ignore[no-any-return]
 
 
 @kernel
-def reach(rows: Any, base: int, lane: int, t: float) -> tuple[float, float, float]:
+def reach(
+    rows: Any, base: int, lane: int, key_a: int, key_b: int, t: float
+) -> tuple[float, float, float]:
     """Return angle, rate and acceleration of the reach at a time [s]."""
     length = rows[base + WINDOW][lane]
     window = int(t / length)
-    key_a, key_b = int(rows[base + KEY_A][lane]), int(rows[base + KEY_B][lane])
     draw = FIRST_WINDOW + 3 * window
     taken = SHORTEST + (LONGEST - SHORTEST) * uniform(key_a, key_b, STREAM, draw + 1)
     rest = (1.0 - taken) * uniform(key_a, key_b, STREAM, draw + 2)
     share = ((t / length - window) - rest) / taken
-    start = place_of(rows, base, lane, window - 1)
-    way = place_of(rows, base, lane, window) - start
+    start = place_of(rows, base, lane, key_a, key_b, window - 1)
+    way = place_of(rows, base, lane, key_a, key_b, window) - start
     angle, per_second = start + way * least_jerk(share), 1.0 / (taken * length)
     rate = way * least_jerk_rate(share) * per_second
     return angle, rate, way * least_jerk_bend(share) * per_second * per_second
@@ -82,11 +82,16 @@ def swing(rows: Any, base: int, lane: int, t: float) -> tuple[float, float, floa
 
 
 @kernel
-def motion_at(rows: Any, base: int, lane: int, t: float) -> tuple[float, float, float]:
-    """Return the intended angle [rad], its rate and acceleration at a time [s] of one lane."""
+def motion_at(
+    rows: Any, base: int, lane: int, key_a: int, key_b: int, t: float
+) -> tuple[float, float, float]:
+    """Return the intended angle [rad], its rate and acceleration at a time [s] of one lane.
+
+    The key is the one with which the motion was drawn.
+    """
     kind = rows[base + KIND][lane]
     if kind == REACHES:
-        return reach(rows, base, lane, t)
+        return reach(rows, base, lane, key_a, key_b, t)
     if kind == SINES:
         return swing(rows, base, lane, t)
     return rows[base + FIRST][lane], 0.0, 0.0
@@ -114,8 +119,6 @@ def draw_motion(
         chosen = int(uniform(key_a, key_b, STREAM, 0) * 3.0)
     span = high - low
     rows[base + KIND][lane] = float(chosen)
-    rows[base + KEY_A][lane] = float(key_a)
-    rows[base + KEY_B][lane] = float(key_b)
     rows[base + LOW][lane], rows[base + SPAN][lane] = low, span
     rows[base + WINDOW][lane] = window
     first = low + span * uniform(key_a, key_b, STREAM, 1)

@@ -1,6 +1,5 @@
-"""Machine code by address: in the background, cached, shipped, free of foreign functions."""
+"""Machine code by address: in the background, cached, free of foreign functions."""
 
-import json
 import os
 import subprocess
 import sys
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 
 from pam_envs.envs.core import plant_env
-from pam_envs.kernels import emission, intermediate, machine_code, notice, shipped
+from pam_envs.kernels import emission, intermediate, machine_code, notice
 from pam_envs.kernels.build import COMPILED, address_book
 from pam_envs.kernels.machine_code import MachineCode, intermediate_of
 from tests.envs.cases import trajectory
@@ -138,43 +137,6 @@ def test_intermediate_form_is_the_same_in_every_process(tmp_path: Path) -> None:
         )
         found.add(done.stdout)
     assert len(found) == 1
-
-
-@pytest.fixture
-def package(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Provide a folder with shipped code of one kernel, for this processor."""
-    folder = tmp_path / "objects"
-    kernel = Scale(2.0).by_address
-    data = emission.emit(intermediate_of(Scale(2.0)), emission.host())
-    shipped.write([(kernel, data)], folder)
-    monkeypatch.setattr(shipped, "FOLDER", folder)
-    monkeypatch.setattr(shipped, "supported", lambda: True)
-    shipped._codes.cache_clear()
-    yield folder
-    shipped._codes.cache_clear()
-
-
-def test_shipped_code_is_used(package: Path) -> None:
-    data = shipped.find(Scale(2.0).by_address)
-    assert data is not None
-    assert called(machine_code.load(data)) == [2.0, 4.0, 6.0]
-
-
-def test_shipped_code_of_other_values_is_not_used(package: Path) -> None:
-    assert shipped.find(Scale(2.5).by_address) is None
-
-
-def test_shipped_code_of_other_sources_is_not_used(package: Path) -> None:
-    path = package / shipped.MANIFEST
-    manifest = json.loads(path.read_text())
-    path.write_text(json.dumps({**manifest, "sources": "0" * 64}))
-    assert shipped.find(Scale(2.0).by_address) is None
-
-
-def test_damaged_code_is_not_used(package: Path) -> None:
-    path = package / "scale.o"
-    path.write_bytes(path.read_bytes()[:-1])
-    assert shipped.find(Scale(2.0).by_address) is None
 
 
 def test_steps_continue_in_plain_python_until_the_code_is_ready(

@@ -22,7 +22,8 @@ from pam_envs.references.reaches import (
 )
 
 LOW, HIGH, SECONDS = 0.3, 1.8, 2.5
-at, draw = entry(motion_at), entry(draw_motion)
+draw = entry(draw_motion)
+_motion_at = entry(motion_at)
 
 
 def drawn(seed: int, kind: int) -> np.ndarray:
@@ -31,16 +32,22 @@ def drawn(seed: int, kind: int) -> np.ndarray:
     return rows
 
 
-def course(rows: np.ndarray, times: np.ndarray) -> np.ndarray:
+def at(seed: int, kind: int, t: float) -> tuple[float, float, float]:
+    """Return angle, rate and acceleration of a drawn motion at a time [s]."""
+    return _motion_at(drawn(seed, kind), 0, 0, *seed_words(seed), t)
+
+
+def course(seed: int, kind: int, times: np.ndarray) -> np.ndarray:
     """Return angle, rate and acceleration, shape (3, n)."""
-    return np.array([at(rows, 0, 0, float(t)) for t in times]).T
+    rows, key = drawn(seed, kind), seed_words(seed)
+    return np.array([_motion_at(rows, 0, 0, *key, float(t)) for t in times]).T
 
 
 @pytest.mark.parametrize("kind", [REACHES, SINES, STILL])
 def test_motions_stay_in_their_range_and_begin_at_rest(kind):
     times = np.arange(0.0, 20.0, 0.05)
     for seed in range(5):
-        angle, rate, _ = course(drawn(seed, kind), times)
+        angle, rate, _ = course(seed, kind, times)
         assert angle.min() >= LOW - 1e-12 and angle.max() <= HIGH + 1e-12
         assert rate[0] == pytest.approx(0.0, abs=1e-12)
         assert (np.ptp(angle) > 0.3) == (kind != STILL)
@@ -49,15 +56,13 @@ def test_motions_stay_in_their_range_and_begin_at_rest(kind):
 @pytest.mark.parametrize("kind", [REACHES, SINES])
 def test_rate_and_acceleration_are_derivatives(kind):
     h, times = 1e-5, np.arange(0.1, 12.0, 0.013)
-    rows = drawn(3, kind)
-    slopes = (course(rows, times + h) - course(rows, times - h)) / (2.0 * h)
-    assert np.allclose(slopes[:2], course(rows, times)[1:], atol=1e-4)
+    slopes = (course(3, kind, times + h) - course(3, kind, times - h)) / (2.0 * h)
+    assert np.allclose(slopes[:2], course(3, kind, times)[1:], atol=1e-4)
 
 
 def test_reaches_join_and_rest_between():
-    rows = drawn(1, REACHES)
     for window in range(1, 6):
-        before, after = (at(rows, 0, 0, SECONDS * window + d) for d in (-1e-9, 1e-9))
+        before, after = (at(1, REACHES, SECONDS * window + d) for d in (-1e-9, 1e-9))
         assert before[0] == pytest.approx(after[0], abs=1e-9)
         assert before[1] == pytest.approx(0.0, abs=1e-9)
 
@@ -82,7 +87,7 @@ def test_mixed_motions_draw_each_kind_and_depend_on_the_key():
     kinds = {int(drawn(seed, MIXED)[KIND, 0]) for seed in range(40)}
     assert kinds == set(range(len(MOTIONS) - 1))
     times = np.arange(0.0, 8.0, 0.1)
-    one, other = (course(drawn(seed, REACHES), times)[0] for seed in (7, 8))
-    assert np.array_equal(one, course(drawn(7, REACHES), times)[0])
+    one, other = (course(seed, REACHES, times)[0] for seed in (7, 8))
+    assert np.array_equal(one, course(7, REACHES, times)[0])
     assert np.abs(one - other).max() > 0.1
     assert drawn(7, REACHES)[WINDOW, 0] == SECONDS

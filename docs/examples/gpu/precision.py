@@ -17,9 +17,11 @@ OUTPUTS = {
     "PAM/AntagonisticJoint-v0": ("angle", "rad"),
     "PAM/KneeTension-v0": ("tension", "N"),
     "PAM/KneeWalk-v0": ("tension", "N"),
+    "PAM/ElbowOrthosis-v0": ("angle", "rad"),
     "PAM/RedundantManipulator-v0": ("angle_0", "rad"),
 }
-"""Controlled quantity of each environment and its unit."""
+"""Controlled quantity of each environment and its unit; of the elbow orthosis, whose torque has no
+sensor, the angle."""
 OPERATION = re.compile(r"\b(?:add|sub|mul|div|rcp|sqrt|fma)\.[\w.]*(f32|f64)\b")
 """Arithmetic in PTX."""
 

@@ -35,8 +35,8 @@ def advance_plant(
 
 @kernel
 def trajectory_at(
-    rows: Any, fixed: Any, samples: Any, settings: Any, choices: Any, step: int, lane: int,
-    channel: int,
+    rows: Any, fixed: Any, counts: Any, samples: Any, settings: Any, choices: Any, step: int,
+    lane: int, channel: int,
 ) -> float:  # fmt: skip
     """Return the reference of one lane at a control period: given samples, or a drawn family."""
     if choices[CHOICE.reference] == SAMPLES:

@@ -104,7 +104,7 @@ def extend_preview(
         for j in range(LANES):
             k = step[j] + far
             ahead[first + (k & (ring - 1))][j] = env_reference(
-                rows, fixed, samples, settings, choices, k, j, channel
+                rows, fixed, counts, samples, settings, choices, k, j, channel
             )
 
 
@@ -151,7 +151,7 @@ def reset_lane(
     for channel in range(CHANNELS):
         for k in range(choices[CHOICE.preview] * choices[CHOICE.stride] + 1):
             ahead[channel * ring + k][j] = env_reference(
-                rows, fixed, samples, settings, choices, k, j, channel
+                rows, fixed, counts, samples, settings, choices, k, j, channel
             )
 
 

@@ -23,8 +23,6 @@ BOOK = (
 """Arrays in the order of the address book."""
 DTYPES = ("float64", "float32")
 """Types of numbers that are neither integers nor observations."""
-KEYS_IN_STATE = ("elbow",)
-"""Families whose state holds keys of random numbers, integers that float32 cannot hold."""
 
 
 class DeviceVectorEnv(Batch):
@@ -47,8 +45,7 @@ class DeviceVectorEnv(Batch):
     device : Device or str
         "cuda", "cuda:1" for the second GPU, or "host" for the processor in its place.
     dtype : {"float64", "float32"}
-        Type of the state, of parameters and of all arithmetic but random numbers. "float32" is not
-        offered for the elbow orthosis.
+        Type of the state, of parameters and of all arithmetic but random numbers.
     info : bool
         Whether steps return ``info``; learning needs none and is faster without.
     autoreset_mode : AutoresetMode or str
@@ -79,11 +76,6 @@ class DeviceVectorEnv(Batch):
         )
         self.device = device_of(device) if isinstance(device, str) else device
         check_choice("dtype", dtype, DTYPES)
-        if dtype == "float32" and setup.kernels.family in KEYS_IN_STATE:
-            raise ValueError(
-                f"dtype = 'float32' is not offered for the family {setup.kernels.family!r}: its "
-                "state holds 32-bit keys of random numbers, which float32 rounds; choose 'float64'"
-            )
         self.dtype = dtype
         self.with_info = bool(info)
         self._torch = _torch()

@@ -123,7 +123,7 @@ def apply_elbow(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
     for j in range(LANES):
         store_period(rows, j)
         rows[K.INTENT][j], rows[K.INTENT_RATE][j], rows[K.INTENT_ACCELERATION][j] = motion_at(
-            rows, L.MOTION, j, (step[j] + 1) * period
+            rows, L.MOTION, j, counts[K.KEY_A][j], counts[K.KEY_B][j], (step[j] + 1) * period
         )
     for j in range(LANES):
         a, b = rows[L.ACTION][j], rows[L.ACTION + 1][j]
@@ -152,11 +152,14 @@ def store_period(rows: Any, j: int) -> None:
 
 @kernel
 def reference_at(
-    rows: Any, fixed: Any, samples: Any, settings: Any, choices: Any, step: int, lane: int,
-    channel: int,
+    rows: Any, fixed: Any, counts: Any, samples: Any, settings: Any, choices: Any, step: int,
+    lane: int, channel: int,
 ) -> float:  # fmt: skip
     """Return the reference of one lane at a control period, at the angle intended then."""
-    angle, _, _ = motion_at(rows, L.MOTION, lane, step * settings[0][PERIOD])
+    angle, _, _ = motion_at(
+        rows, L.MOTION, lane, counts[K.KEY_A][lane], counts[K.KEY_B][lane],
+        step * settings[0][PERIOD],
+    )  # fmt: skip
     torque, stiffness = desired_at(rows, settings, choices, lane, angle, step)
     torque, stiffness = within_reach(settings[choices[CHOICE.at_own]], angle, torque, stiffness)
     return torque if channel == 0 else stiffness
@@ -289,7 +292,7 @@ def begin_elbow(
     window = config[L.CONFIG.window]
     draw_motion(rows, L.MOTION, j, key_a, key_b, choices[L.CHOICE.motion], low, high, window)
     draw_object(rows, counts, settings, choices, j)
-    angle, _, _ = motion_at(rows, L.MOTION, j, 0.0)
+    angle, _, _ = motion_at(rows, L.MOTION, j, key_a, key_b, 0.0)
     rows[K.INTENT][j], rows[K.INTENT_RATE][j], rows[K.INTENT_ACCELERATION][j] = angle, 0.0, 0.0
     rows[K.DISTURBANCE][j] = 0.0
     torque, stiffness = desired_at(rows, settings, choices, j, angle, 0)

@@ -126,8 +126,8 @@ def apply_joint(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
 
 @kernel
 def reference_at(
-    rows: Any, fixed: Any, samples: Any, settings: Any, choices: Any, step: int, lane: int,
-    channel: int,
+    rows: Any, fixed: Any, counts: Any, samples: Any, settings: Any, choices: Any, step: int,
+    lane: int, channel: int,
 ) -> float:  # fmt: skip
     """Return the reference [rad] of one lane at a control period."""
     config, family = settings[0], choices[CHOICE.reference]
@@ -137,7 +137,7 @@ def reference_at(
         return config[CONFIG.amplitude] * sine_of_turns(turns)  # type: ignore[no-any-return]
     if family == STEP:
         return 0.0 if time < STEP_SECONDS else config[CONFIG.amplitude]
-    return trajectory_at(rows, fixed, samples, settings, choices, step, lane, channel)
+    return trajectory_at(rows, fixed, counts, samples, settings, choices, step, lane, channel)
 
 
 @kernel

@@ -89,8 +89,8 @@ def planned_torque(
 
 @kernel
 def planned_reference(
-    rows: Any, fixed: Any, samples: Any, settings: Any, choices: Any, step: int, lane: int,
-    channel: int,
+    rows: Any, fixed: Any, counts: Any, samples: Any, settings: Any, choices: Any, step: int,
+    lane: int, channel: int,
 ) -> float:  # fmt: skip
     """Return the planned tension [N] or angle [rad] of a control period.
 

@@ -99,8 +99,8 @@ def read_lane(rows: Any, fixed: Any, counts: Any, step: int, period: float, j: i
 
 @kernel
 def path_at(
-    rows: Any, fixed: Any, samples: Any, settings: Any, choices: Any, step: int, lane: int,
-    channel: int,
+    rows: Any, fixed: Any, counts: Any, samples: Any, settings: Any, choices: Any, step: int,
+    lane: int, channel: int,
 ) -> float:  # fmt: skip
     """Return one number of the desired pose, or one planned angle, at a control period."""
     config = settings[0]
