@@ -49,15 +49,16 @@ def train(
     resume: bool = False,
     config: Path | None = None,
     set: Changes = (),
-    device: Processor = "cpu",
+    device: Processor | None = None,
 ) -> None:
     """Train a policy and export it as ONNX.
 
     Args:
         seed: Seed of weights, exploration and episodes; default: 0.
         out: Folder of the run; default: runs/ENV/ALGO-seedSEED.
-        resume: Continue the run in that folder with its settings; only --steps may change. A run
-            that ended before its first checkpoint starts again, with the settings of this command.
+        resume: Continue the run in that folder with its settings; only --steps and --device may
+            change. A run that ended before its first checkpoint starts again, with the settings of
+            this command.
         config: YAML file or policy.onnx whose settings replace the preset.
     """
     from agents.training import sweep as sweeping
@@ -74,7 +75,7 @@ def train(
     def fresh() -> Run:
         settings = _settings(name, kind, variant, config)
         changes = [*set, *([] if steps is None else [f"steps={steps}"])]
-        return Run(configs.changed(settings, changes), number, folder, device)
+        return Run(configs.changed(settings, changes), number, folder, device or "cpu")
 
     if not resume:
         run = fresh()
@@ -100,7 +101,8 @@ def train(
                 if given not in (None, there):
                     raise SettingsError(f"{folder} holds a run of {there}: leave {given} out")
             model = training.resume(run)
-            console.print(f"continues at {model.num_timesteps:,} of {run.config.steps:,} steps")
+            done = f"{model.num_timesteps:,} of {run.config.steps:,}"
+            console.print(f"continues at {done} steps on {run.device}")
         else:
             model = training.start(run)
         print(training.train(run, model, console))

@@ -138,7 +138,11 @@ class Checkpoints(PeriodicCallback):
     def __init__(self, run: Run, clock: Clock, evaluations: Evaluations) -> None:
         super().__init__(run.config.checkpoint_steps)
         self.path = run.checkpoint
-        self.settings = {"config": run.config.as_dict(), "seed": run.seed}
+        self.settings = {
+            "config": run.config.as_dict(),
+            "seed": run.seed,
+            "device": run.device,
+        }
         self.clock = clock
         self.evaluations = evaluations
 

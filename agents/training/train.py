@@ -68,16 +68,13 @@ def start(run: Run) -> BaseAlgorithm:
     return model
 
 
-def saved_run(folder: Path, steps: int | None = None, device: str = "cpu") -> Run:
-    """Return the run of a folder's checkpoint, with another number of steps if given.
-
-    It goes on with its networks on ``device``.
-    """
+def saved_run(folder: Path, steps: int | None = None, device: str | None = None) -> Run:
+    """Return the run of a folder's checkpoint, with other steps or another device if given."""
     settings = _settings(checkpoint.load(folder / CHECKPOINT))
     given = settings["config"]
     if steps is not None:
         given = {**given, "steps": steps}
-    return Run(configs.from_mapping(given), settings["seed"], folder, device)
+    return Run(configs.from_mapping(given), settings["seed"], folder, device or settings["device"])
 
 
 def _settings(content: dict[str, Any]) -> dict[str, Any]:
@@ -85,7 +82,9 @@ def _settings(content: dict[str, Any]) -> dict[str, Any]:
         settings: dict[str, Any] = json.loads(content["settings"])
         if type(settings["seed"]) is not int or settings["seed"] < 0:
             raise ValueError("seed")
-        return {key: settings[key] for key in ("config", "seed", "plants")}
+        if settings["device"] not in ("cpu", "cuda"):
+            raise ValueError("device")
+        return {key: settings[key] for key in ("config", "seed", "device", "plants")}
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise CheckpointError(f"{CHECKPOINT} lacks the settings of its training") from error
 

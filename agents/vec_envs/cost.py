@@ -22,8 +22,8 @@ class CostVecEnv(VecEnvWrapper):
     ``reward/ended``, the sum of the lowest possible rewards of the remaining periods, is therefore
     multiplied by ``2 d``. ``venv`` is a :class:`agents.vec_envs.batch.BatchVecEnv`.
 
-    With ``cost.relative`` the reward of a row is divided by the mean cost of the errors of its kind
-    of rows so far.
+    With ``cost.relative`` the costs of errors and ``reward/ended`` are divided by the mean cost of
+    the errors of the same kind of rows so far.
     """
 
     def __init__(self, venv: VecEnv, cost: Cost) -> None:
@@ -61,16 +61,15 @@ class CostVecEnv(VecEnvWrapper):
         observation, _, done, infos = self.venv.step_wait()
         last = self.base.last
         errors = np.sum([self._error_cost(-last[name]) for name in self.errors], axis=0)
-        made = last[EFFORT] - errors
+        share = self._mean(errors) if self.cost.relative else np.ones(self.num_envs)
+        made = last[EFFORT] - errors / share
         change = (self.action - self.before) / (self.high - self.low)
         moved = np.square(change, dtype=np.float64).sum(axis=1)
         made = made - self.cost.action_rate * np.where(self.started, moved, 0.0)
         if self.has_end:
-            made = made + max(2.0 * self.cost.quadratic, 1.0) * last[ENDED]
+            made = made + max(2.0 * self.cost.quadratic, 1.0) * last[ENDED] / share
         elif self.cost.ended:
             made = made - self.cost.ended * self._cut_off(done, infos)
-        if self.cost.relative:
-            made = made / self._mean(errors)
         self.before, self.started = self.action, ~done
         return observation, made.astype(np.float32), done, infos
 

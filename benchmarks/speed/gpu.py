@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 
 from benchmarks.speed.rates import Chunk, Measurement, Missing, interleaved, median
+from pam_envs.__main__ import env_ids
 from pam_envs.envs.core.lanes import PARTS, LaneKernel
 from pam_envs.envs.device.vector_env import DTYPES
 
@@ -34,13 +35,14 @@ PUBLISHED = {
 def gpu(rounds: int, device: str = "cuda", sizes: Sequence[int] = SIZES) -> list[Measurement]:
     """Batches on a GPU: bits, registers, steps per second, published figures beside them."""
     results = []
-    for name in ENVS:
+    for name in env_ids():
         try:
             bits = differing_values(name, device, 4096, 300)
         except (gym.error.DependencyNotInstalled, RuntimeError) as error:
             raise Missing(str(error)) from error
         title = f"{name[4:-3]}, N = 4,096, 300 steps, values that differ from the CPU's"
         results.append(Measurement("gpu", title, bits, "", 0.0, better="less"))
+    for name in ENVS:
         for dtype in DTYPES:
             results += registers(name, device, dtype)
     for name in ENVS:

@@ -120,6 +120,8 @@ class MachineCode:
         kernel = self._source.by_address
         try:
             data = shipped.find(kernel)
+            if data is not None and not shipped.loads_here(data, FOLDER):
+                raise RuntimeError("a process that loaded it has failed")
             if data is not None:
                 return load(data)
         except Exception as error:  # whatever it is, the kernel can be compiled here
@@ -182,7 +184,8 @@ def load(data: bytes) -> Run:
     Raises
     ------
     RuntimeError
-        If it is no object file of this platform, or has no such function.
+        If the data are no object file, or have no such function. LLVM ends the process that loads
+        an object file of another platform.
     """
     import llvmlite.binding as llvm
 
@@ -195,7 +198,7 @@ def load(data: bytes) -> Run:
     )
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     code = llvm.object_file.ObjectFileRef.from_data(data)
-    if not code._ptr:  # otherwise the loader crashes
+    if not code:  # otherwise the loader crashes
         raise RuntimeError("the data are no object file")
     engine.add_object_file(code)
     engine.finalize_object()

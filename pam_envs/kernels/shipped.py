@@ -8,12 +8,15 @@ sources, the functions of the kernel and the values that they read are the same.
 import hashlib
 import json
 import shutil
+import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pam_envs.kernels.build import INTRINSICS
+from pam_envs.kernels.cache import make_folder, read_whole, write_whole
 from pam_envs.kernels.rebind import graph_digest, place
 
 if TYPE_CHECKING:
@@ -23,7 +26,8 @@ PACKAGE = Path(__file__).resolve().parents[1]
 FOLDER = Path(__file__).resolve().parent / "objects"
 MANIFEST = "manifest.json"
 BESIDE = ("agents", "baselines", "sweeps")
-"""Folders that are in the package only in the wheel (``hatch_build.py``); they hold no kernels."""
+"""Folders that are in the package only in the wheel (``hatch_build.py``); no kernel of an
+environment is among them, nor calls one there."""
 
 
 class Platform(NamedTuple):
@@ -45,6 +49,14 @@ PLATFORMS = {
     "windows-arm64": Platform("aarch64-pc-windows-msvc", "generic"),
 }
 """Platforms of the code, which are also the names of its folders."""
+LOADING = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from pam_envs.kernels.machine_code import load
+load(sys.stdin.buffer.read())
+"""
+TRIED = ("linux-x86_64", "linux-arm64")
+"""Platforms on which the code has been run; on others a child process loads it first."""
 PROCESSORS = {"x86_64": "x86_64", "aarch64": "arm64", "arm64": "arm64"}
 SYSTEMS = {"linux": "linux", "darwin": "macos", "macosx": "macos", "windows-msvc": "windows"}
 """Parts of the names of platforms, by what LLVM calls them."""
@@ -77,6 +89,25 @@ def find(kernel: "AddressKernel") -> bytes | None:
     except OSError:
         return None
     return data if hashlib.sha256(data).hexdigest() == entry["sha256"].get(platform) else None
+
+
+def loads_here(data: bytes, cache: Path) -> bool:
+    """Return whether object code can be loaded on a platform where nobody has run it yet.
+
+    A child process tries it, once on a machine: LLVM ends a process that loads what it cannot use.
+    ``cache`` is the folder that holds the answer.
+    """
+    if _codes()[0] in TRIED:
+        return True
+    answer = cache / f"loads_{hashlib.sha256(data).hexdigest()[:16]}"
+    known = read_whole(answer)
+    if known is None:
+        child = [sys.executable, "-c", LOADING, str(PACKAGE.parent)]
+        done = subprocess.run(child, input=data, capture_output=True, timeout=60, check=False)
+        known = b"no" if done.returncode else b"yes"
+        make_folder(cache)
+        write_whole(answer, known)
+    return known == b"yes"
 
 
 def file_of(folder: Path, platform: str, name: str) -> Path:
@@ -115,7 +146,8 @@ def write(
     folder: Path = FOLDER,
 ) -> None:
     """Write the object code of kernels for each platform, by their names, and the manifest."""
-    shutil.rmtree(folder, ignore_errors=True)
+    if folder.exists():
+        shutil.rmtree(folder)
     entries: dict[str, Any] = {}
     for kernel in kernels:
         digests = {}

@@ -12,6 +12,7 @@ import pytest
 
 from pam_envs.kernels import emission, machine_code, shipped
 from pam_envs.kernels.build import COMPILED, address_book
+from pam_envs.kernels.cache import read_whole
 from pam_envs.kernels.intermediate import ENTRY
 from pam_envs.kernels.machine_code import MachineCode, intermediate_of
 from tests.kernels.address_kernels import Scale
@@ -186,3 +187,21 @@ def test_digest_of_sources_is_that_of_the_checkout(
     assert shipped.sources() == checkout
     (tmp_path / "kernels/step.py").write_text("a = 2\n")
     assert shipped.sources() != checkout
+
+
+@pytest.mark.parametrize("good", [True, False])
+def test_code_of_a_platform_that_nobody_has_tried_is_loaded_by_a_child_first(
+    folder: Path,
+    good: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    foreign = next(p for p in shipped.PLATFORMS.values() if p.triple.endswith("windows-msvc"))
+    target = emission.host() if good else emission.Target(foreign.triple, foreign.cpu, jit=True)
+    ship(folder, {here(): emission.emit(intermediate_of(Scale(2.0)), target)})
+    monkeypatch.setattr(shipped, "TRIED", ())
+    for _ in range(2):  # the second time by the note
+        assert called(MachineCode(Scale(2.0)).wait()) == [2.0, 4.0, 6.0]
+    notes = [read_whole(path) for path in (folder.parent / "cache").glob("loads_*")]
+    assert notes == [b"yes" if good else b"no"]
+    assert ("a process that loaded it has failed" in capsys.readouterr().err) != good

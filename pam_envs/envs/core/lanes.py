@@ -91,7 +91,7 @@ _GRID = """
 declare i32 @llvm.nvvm.read.ptx.sreg.ctaid.x()
 declare i32 @llvm.nvvm.read.ptx.sreg.ntid.x()
 declare i32 @llvm.nvvm.read.ptx.sreg.tid.x()
-define ptx_kernel void @{name}(ptr %book, i64 %number) {limit}{{
+define ptx_kernel void @{name}(ptr %book, i64 %number) {{
   %block = call i32 @llvm.nvvm.read.ptx.sreg.ctaid.x()
   %size = call i32 @llvm.nvvm.read.ptx.sreg.ntid.x()
   %thread = call i32 @llvm.nvvm.read.ptx.sreg.tid.x()
@@ -109,6 +109,10 @@ done:
   ret void
 }}
 """
+_LIMIT = """
+!nvvm.annotations = !{{!999999}}
+!999999 = !{{ptr @{name}, !"maxnreg", i32 {registers}}}
+"""  # LLVM 20 ignores the attribute "nvvm.maxnreg"
 _LOOP = """
 define void @{name}(ptr %book, i64 %number) {{
 begin:
@@ -160,7 +164,10 @@ class LaneKernel:
     def ptx(self, name: str, architecture: str = ARCHITECTURE) -> bytes:
         """Return PTX with one kernel, ``name(int64_t *book, int64_t number)``."""
         target = Target("nvptx64-nvidia-cuda", architecture)
-        return emitted(self._launched(_GRID, name), target, assembly=True)
+        text = self._launched(_GRID, name)
+        if self.part in REGISTERS:
+            text += _LIMIT.format(name=name, registers=REGISTERS[self.part])
+        return emitted(text, target, assembly=True)
 
     def object_code(self, target: Target) -> bytes:
         """Return object code for a processor, with the loop over environments as its entry."""
@@ -170,6 +177,4 @@ class LaneKernel:
         """Return the LLVM IR with one public function, the launch."""
         text = intermediate_of(self).replace(f"@{ENTRY}(", f"@{_LANE}(")
         text = text.replace(f"define void @{_LANE}(", f"define internal void @{_LANE}(")
-        registers = REGISTERS.get(self.part)
-        limit = f'"nvvm.maxnreg"="{registers}" ' if registers else ""
-        return text + launch.format(name=name, lane=_LANE, limit=limit)
+        return text + launch.format(name=name, lane=_LANE)

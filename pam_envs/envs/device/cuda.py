@@ -85,7 +85,7 @@ class CudaArray:
 
 
 class CudaDevice:
-    """A GPU. Work is queued in its default stream, that of torch unless another one is set there.
+    """A GPU. Work is queued in its default stream, and makes the GPU the current one.
 
     Parameters
     ----------
@@ -94,7 +94,8 @@ class CudaDevice:
     """
 
     def __init__(self, number: int = 0) -> None:
-        self.name = f"cuda:{number}"
+        self.name, self._number = f"cuda:{number}", number
+        self._torch: Any = None  # once it has tensors of the batch
         try:
             from cuda.core import LEGACY_DEFAULT_STREAM, Device
         except ImportError as error:
@@ -161,7 +162,21 @@ class CudaDevice:
         """Return a tensor of torch in the memory of an array."""
         import torch
 
+        if not torch.cuda.is_available():
+            raise RuntimeError(
+                f"PyTorch {torch.__version__} finds no GPU, but the batch is on {self.name}; "
+                "install its build for CUDA, or uninstall it to get arrays for DLPack"
+            )
+        self._torch = torch
         return torch.as_tensor(array, device=self.name)
+
+    def check_stream(self) -> None:
+        """Raise RuntimeError if torch queues its work in another stream than the device."""
+        if self._torch is not None and self._torch.cuda.current_stream(self._number).cuda_stream:
+            raise RuntimeError(
+                "torch uses another stream than the default one, in which the batch queues its "
+                "work; step outside torch.cuda.stream and torch.cuda.graph"
+            )
 
     def take(self, array: CudaArray, given: Any) -> None:
         """Overwrite an array with one of another library, of the same shape and type."""
@@ -173,12 +188,18 @@ class CudaDevice:
                 f"actions of shape {source.shape} and type {source.dtype}, expected {array.shape} "
                 f"of {array.dtype}; convert them, or install torch, whose tensors are converted"
             )
-        if source.strides not in (None, _strides(array.shape)):
+        if not _contiguous(source.shape, source.strides):
             raise ValueError(
-                f"actions with strides {source.strides}, expected {_strides(array.shape)} (rows "
-                "one after the other); give a contiguous copy"
+                f"actions of shape {source.shape} with strides {source.strides}, expected rows one "
+                "after the other; give a contiguous copy"
+            )
+        if not source.is_device_accessible or source.device_id != self._device.device_id:
+            raise ValueError(
+                f"actions that are not in the memory of {self.name}; move them there, or give a "
+                "NumPy array"
             )
         self._copy(array, source.ptr)
+        self._stream.sync()  # the other library may reuse the memory
 
     def address(self, array: CudaArray) -> int:
         """Return the address of an array."""
@@ -210,6 +231,11 @@ class CudaDevice:
         self._stream.sync()
 
 
-def _strides(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the strides, in elements, of an array whose rows are one after the other."""
-    return tuple(int(np.prod(shape[i + 1 :])) for i in range(len(shape)))
+def _contiguous(shape: tuple[int, ...], strides: tuple[int, ...] | None) -> bool:
+    """Return whether rows are one after the other, by the strides in elements."""
+    if strides is None:
+        return True
+    expected = [int(np.prod(shape[i + 1 :])) for i in range(len(shape))]
+    return all(
+        n == 1 or own == other for n, own, other in zip(shape, strides, expected, strict=True)
+    )

@@ -15,7 +15,10 @@ Launch = Callable[[Any, int], None]
 
 
 class Device(Protocol):
-    """A device with its own memory. Copies and launches are in order; only ``read`` waits."""
+    """A device with its own memory.
+
+    Copies and launches are in order; ``read`` and ``write`` wait for earlier work.
+    """
 
     name: str
 
@@ -35,13 +38,16 @@ class Device(Protocol):
         """Overwrite an array with one of another library, which it gives by DLPack."""
 
     def tensor(self, array: Any) -> Any:
-        """Return a tensor of torch in the memory of an array."""
+        """Return a tensor of torch in the memory of an array, which it keeps."""
 
     def address(self, array: Any) -> int:
         """Return the address of an array."""
 
     def load(self, kernel: LaneKernel) -> Launch:
         """Return a kernel ready to launch."""
+
+    def check_stream(self) -> None:
+        """Raise RuntimeError if torch queues its work in another stream than the device."""
 
     def synchronise(self) -> None:
         """Wait until all earlier work is done."""
@@ -90,6 +96,9 @@ class HostDevice:
         """Return the loop over environments in machine code."""
         run = load(kernel.object_code(host()))
         return lambda book, number: run(book.ctypes.data, number)
+
+    def check_stream(self) -> None:
+        """Do nothing: the processor has no streams."""
 
     def synchronise(self) -> None:
         """Do nothing: a launch returns when it is done."""

@@ -1,5 +1,6 @@
 """The batch of environments on a device."""
 
+from contextlib import nullcontext
 from typing import Any
 
 import gymnasium as gym
@@ -29,10 +30,10 @@ class DeviceVectorEnv(Batch):
     """``num_envs`` environments that one launch steps on a GPU.
 
     Row ``i`` of a batch reset with seed ``s`` is the single environment reset with ``s + i``. Steps
-    wait for nothing: they queue work and return. Results are tensors of torch on the device where
-    torch is installed, otherwise arrays that other libraries take by DLPack; each belongs to the
-    caller. Actions may be tensors on the device, of any type, which are not checked for finite
-    values, or NumPy arrays.
+    with actions on the device wait for nothing: they queue work and return. Results are tensors of
+    torch on the device where torch is installed, otherwise arrays that other libraries take by
+    DLPack; each belongs to the caller. Actions may be tensors on the device, of any type, which are
+    not checked for finite values, or NumPy arrays.
 
     Resets happen in the same step. Every step's ``infos["final_obs"]`` and, with ``info``,
     ``infos["final_info"]`` hold the values before the resets, for all rows: those of ended episodes
@@ -81,7 +82,8 @@ class DeviceVectorEnv(Batch):
         self._torch = _torch()
         self._arrays = {name: self.device.upload(a) for name, a in self._initial().items()}
         shared = () if self._torch is None else ("actions", "observations", "report", "flags")
-        self._tensors = {name: self.device.tensor(self._arrays[name]) for name in shared}
+        with nullcontext() if self._torch is None else self._torch.inference_mode(False):
+            self._tensors = {name: self.device.tensor(self._arrays[name]) for name in shared}
         book = np.zeros((len(BOOK), 4), np.int64)
         for row, name in zip(book, BOOK, strict=True):
             array = self._arrays[name]
@@ -117,6 +119,7 @@ class DeviceVectorEnv(Batch):
         options: dict[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
         """Start episodes; see Gymnasium. ``options["reset_mask"]`` resets some rows only."""
+        self.device.check_stream()
         mask = self._mask(options)
         self._seed_rows(self._seeds(seed), mask)
         report = self._arrays["report"]
@@ -142,6 +145,7 @@ class DeviceVectorEnv(Batch):
         """Apply one action a row; see Gymnasium."""
         if not self._seeded:
             raise gym.error.ResetNeeded("call reset() before step()")
+        self.device.check_stream()
         self._take(actions)
         self._launch("step")
         final = self._give("observations")[0]
@@ -160,7 +164,7 @@ class DeviceVectorEnv(Batch):
             if tuple(actions.shape) != array.shape:
                 raise ValueError(f"actions of shape {tuple(actions.shape)}, expected {array.shape}")
             if torch is not None and isinstance(actions, torch.Tensor):
-                self._tensors["actions"].copy_(actions)
+                self._tensors["actions"].copy_(actions.detach())
             else:
                 self.device.take(array, actions)
         else:

@@ -108,15 +108,18 @@ def test_relative_costs_are_shares_of_the_mean_of_each_kind_of_rows():
     own = {name: value for name, value in SHORT.items() if name != "load"}
     made: list[np.ndarray] = []
     for relative in (False, True):
-        cost = Cost(relative=relative)
+        cost = Cost(relative=relative, action_rate=3.0)
         env = CostVecEnv(make_batch_vec_env(ID, N, *kinds, **own), cost)
         env.seed(SEED)
         env.reset()
         rewards, errors = [], []
         for _ in range(STEPS):
-            rewards.append(env.step(np.zeros((2 * N, 1), np.float32))[1])
+            action = np.full((2 * N, 1), len(errors) / STEPS, np.float32)
+            rewards.append(env.step(action)[1])
             errors.append(-env.base.last["reward/tracking"])
-        made.append(np.array(rewards))
+        made.append(np.array(rewards) + np.array(errors))
+    errors = np.array(errors)
     for rows in (slice(0, N), slice(N, 2 * N)):
-        mean = np.cumsum(np.array(errors)[:, rows].mean(axis=1)) / np.arange(1, STEPS + 1)
-        assert made[1][:, rows] == pytest.approx(made[0][:, rows] / mean[:, None], rel=1e-5)
+        mean = np.cumsum(errors[:, rows].mean(axis=1)) / np.arange(1, STEPS + 1)
+        dearer = errors[:, rows] * (1.0 - 1.0 / mean[:, None])
+        assert made[1][:, rows] - made[0][:, rows] == pytest.approx(dearer, rel=1e-4, abs=1e-6)

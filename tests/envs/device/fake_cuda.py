@@ -36,6 +36,7 @@ class StridedMemoryView:
         self.array, self.keep = array, keep
         self.shape, self.dtype, self.ptr = array.shape, array.dtype, array.ctypes.data
         self.strides = tuple(step // array.itemsize for step in array.strides)
+        self.is_device_accessible, self.device_id = True, 0
 
     @staticmethod
     def from_buffer(
@@ -73,7 +74,7 @@ STREAM = Stream()
 class Device:
     """A GPU whose memory is that of the processor."""
 
-    number: int
+    device_id: int
     name: str = "processor"
 
     def set_current(self) -> None:

@@ -1,6 +1,7 @@
 """GPU through cuda-core: addresses, copies, launches and arrays, with the driver replaced."""
 
 import sys
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium as gym
@@ -17,6 +18,7 @@ from tests.envs.device import fake_cuda
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="batches on a device are compiled")
 ID = "PAM/MusclePositioning-v0"
+TENSOR = CudaDevice.tensor
 
 
 @pytest.fixture(autouse=True)
@@ -101,8 +103,42 @@ def test_actions_of_another_library_are_taken(monkeypatch: pytest.MonkeyPatch) -
     assert np.array_equal(device.read(array), np.ones((3, 2)))
     with pytest.raises(ValueError, match=r"float32.*expected"):
         device.take(array, CudaArray(given._buffer, (3, 2), np.float32))
-    with pytest.raises(ValueError, match=r"strides \(1, 3\), expected \(2, 1\)"):
+    with pytest.raises(ValueError, match=r"strides \(1, 3\), expected rows"):
         device.take(array, np.ones((2, 3)).T)
+    column = device.upload(np.zeros((3, 1)))
+    device.take(column, np.arange(3.0)[:, None])  # strides (1, 0)
+    assert np.array_equal(device.read(column)[:, 0], np.arange(3.0))
+
+
+def test_actions_elsewhere_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    device = CudaDevice()
+    array = device.upload(np.zeros((3, 2)))
+    view = fake_cuda.StridedMemoryView(np.ones((3, 2)), None)
+    view.is_device_accessible = False
+    monkeypatch.setattr(
+        fake_cuda.StridedMemoryView, "from_any_interface", staticmethod(lambda *given: view)
+    )
+    with pytest.raises(ValueError, match="not in the memory of cuda:0; move them"):
+        device.take(array, np.ones((3, 2)))
+
+
+def test_torch_without_the_gpu_is_named_with_its_remedy() -> None:
+    torch = pytest.importorskip("torch")
+    if torch.cuda.is_available():
+        pytest.skip("torch has a GPU")
+    device = CudaDevice()
+    with pytest.raises(RuntimeError, match=r"finds no GPU, but the batch is on cuda:0.*its build"):
+        TENSOR(device, device.upload(np.zeros(3)))
+
+
+def test_other_stream_of_torch_is_refused() -> None:
+    device = CudaDevice()
+    streams = {0: SimpleNamespace(cuda_stream=0)}
+    device._torch = SimpleNamespace(cuda=SimpleNamespace(current_stream=streams.get))
+    device.check_stream()
+    streams[0] = SimpleNamespace(cuda_stream=7)
+    with pytest.raises(RuntimeError, match=r"another stream.*torch\.cuda\.stream"):
+        device.check_stream()
 
 
 def test_error_of_the_driver_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

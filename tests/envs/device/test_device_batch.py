@@ -151,3 +151,22 @@ def test_missing_binding_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatc
 def test_torch_is_used_where_it_is_installed() -> None:
     torch = pytest.importorskip("torch")
     assert vector_env._torch() is torch
+
+
+def test_actions_with_gradients_leave_none_in_the_batch() -> None:
+    torch = pytest.importorskip("torch")
+    envs: Any = gym.make_vec("PAM/MusclePositioning-v0", 3, device="host", info=False)
+    observations, _ = envs.reset(seed=0)
+    policy = torch.nn.Linear(*map(int, (observations.shape[1], envs.action_space.shape[1])))
+    for _ in range(3):
+        observations, *_ = envs.step(policy(observations))
+        assert not observations.requires_grad
+    assert not any(tensor.requires_grad for tensor in envs._tensors.values())
+
+
+def test_batch_made_in_inference_mode_steps_outside_it() -> None:
+    torch = pytest.importorskip("torch")
+    with torch.inference_mode():
+        envs: Any = gym.make_vec("PAM/MusclePositioning-v0", 3, device="host", info=False)
+        envs.reset(seed=0)
+    envs.step(torch.zeros(envs.action_space.shape))
