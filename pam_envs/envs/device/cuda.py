@@ -158,10 +158,8 @@ class CudaDevice:
             stream = int(self._stream.handle)
             self._call("cuMemcpyDtoDAsync", array.address, source, array.nbytes, stream)
 
-    def tensor(self, array: CudaArray) -> Any:
-        """Return a tensor of torch in the memory of an array."""
-        import torch
-
+    def tensor(self, array: CudaArray, torch: Any) -> Any:
+        """Return a tensor in the memory of an array; ``torch`` is the module."""
         if not torch.cuda.is_available():
             raise RuntimeError(
                 f"PyTorch {torch.__version__} finds no GPU, but the batch is on {self.name}; "

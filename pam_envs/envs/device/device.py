@@ -37,8 +37,8 @@ class Device(Protocol):
     def take(self, array: Any, given: Any) -> None:
         """Overwrite an array with one of another library, which it gives by DLPack."""
 
-    def tensor(self, array: Any) -> Any:
-        """Return a tensor of torch in the memory of an array, which it keeps."""
+    def tensor(self, array: Any, torch: Any) -> Any:
+        """Return a tensor in the memory of an array, which it keeps; ``torch`` is the module."""
 
     def address(self, array: Any) -> int:
         """Return the address of an array."""
@@ -82,10 +82,8 @@ class HostDevice:
         """Overwrite an array with one of another library."""
         array[...] = np.from_dlpack(given)
 
-    def tensor(self, array: NDArray[Any]) -> Any:
-        """Return a tensor of torch in the memory of an array."""
-        import torch
-
+    def tensor(self, array: NDArray[Any], torch: Any) -> Any:
+        """Return a tensor in the memory of an array."""
         return torch.from_numpy(array)
 
     def address(self, array: NDArray[Any]) -> int:

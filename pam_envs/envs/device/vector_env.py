@@ -83,7 +83,9 @@ class DeviceVectorEnv(Batch):
         self._arrays = {name: self.device.upload(a) for name, a in self._initial().items()}
         shared = () if self._torch is None else ("actions", "observations", "report", "flags")
         with nullcontext() if self._torch is None else self._torch.inference_mode(False):
-            self._tensors = {name: self.device.tensor(self._arrays[name]) for name in shared}
+            self._tensors = {
+                name: self.device.tensor(self._arrays[name], self._torch) for name in shared
+            }
         book = np.zeros((len(BOOK), 4), np.int64)
         for row, name in zip(book, BOOK, strict=True):
             array = self._arrays[name]

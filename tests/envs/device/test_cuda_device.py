@@ -29,9 +29,7 @@ def driver(monkeypatch: pytest.MonkeyPatch) -> None:
     def compiled(self: CudaDevice, kernel: LaneKernel) -> Any:
         return load(kernel.object_code(host()))
 
-    def tensor(self: CudaDevice, array: CudaArray) -> Any:
-        import torch
-
+    def tensor(self: CudaDevice, array: CudaArray, torch: Any) -> Any:
         return torch.from_numpy(array.view.array)
 
     monkeypatch.setattr(CudaDevice, "compiled", compiled)
@@ -128,7 +126,7 @@ def test_torch_without_the_gpu_is_named_with_its_remedy() -> None:
         pytest.skip("torch has a GPU")
     device = CudaDevice()
     with pytest.raises(RuntimeError, match=r"finds no GPU, but the batch is on cuda:0.*its build"):
-        TENSOR(device, device.upload(np.zeros(3)))
+        TENSOR(device, device.upload(np.zeros(3)), torch)
 
 
 def test_other_stream_of_torch_is_refused() -> None:
