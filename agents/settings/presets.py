@@ -206,6 +206,8 @@ class Config:
         plain = _plain(dataclasses.asdict(self))
         if self.history.stride == 1:  # files from before have none
             del plain["history"]["stride"]
+        if not self.cost.relative:  # likewise
+            del plain["cost"]["relative"]
         default = Config(self.env)
         omitted = [a for a in ALGORITHMS if a != self.algo]
         omitted += [name for name in OPTIONAL if getattr(self, name) == getattr(default, name)]
