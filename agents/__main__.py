@@ -93,8 +93,8 @@ def train(
             run = training.saved_run(folder, steps, device)
             if config is not None or set:
                 raise SettingsError(
-                    "--resume keeps the settings of the run (only --steps may change); leave "
-                    "--config and --set out, or start a new run with another --out"
+                    "--resume keeps the settings of the run (only --steps and --device may "
+                    "change); leave --config and --set out, or start a new run with another --out"
                 )
             own = run.config
             for given, there in ((given_env, own.env), (algo, own.algo), (seed, run.seed)):

@@ -44,6 +44,8 @@ OPTIONAL = (
     *("privileged", "adaptation", "evaluation", "search"),
 )
 """Parts that the plain form omits where they equal their defaults."""
+LATER = (("history", "stride"), ("cost", "relative"))
+"""The same of settings within parts: files from before have none of them."""
 NAME = re.compile(r"[A-Za-z0-9]+-v[0-9]+\.[a-z_]+(-[a-z_]+)?")
 ENV = re.compile(r"PAM/[A-Za-z0-9]+-v[0-9]+")
 """Valid ids. For ``module:id`` Gymnasium would import the module, which runs its code."""
@@ -203,12 +205,10 @@ class Config:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, without other algorithms' parts and optional default parts."""
-        plain = _plain(dataclasses.asdict(self))
-        if self.history.stride == 1:  # files from before have none
-            del plain["history"]["stride"]
-        if not self.cost.relative:  # likewise
-            del plain["cost"]["relative"]
-        default = Config(self.env)
+        plain, default = _plain(dataclasses.asdict(self)), Config(self.env)
+        for part, name in LATER:
+            if plain[part][name] == getattr(getattr(default, part), name):
+                del plain[part][name]
         omitted = [a for a in ALGORITHMS if a != self.algo]
         omitted += [name for name in OPTIONAL if getattr(self, name) == getattr(default, name)]
         return {name: value for name, value in plain.items() if name not in omitted}

@@ -11,8 +11,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import torch
-
 import agents
 import baselines
 import pam_envs
@@ -128,7 +126,11 @@ def hardware(device: str = "cpu") -> str:
     except (OSError, StopIteration):
         pass
     made = f"{model} ({platform.machine()}), {os.cpu_count() or 1} cores, one used"
-    return made if device == "cpu" else f"{made}; {torch.cuda.get_device_name(device)}"
+    if device == "cpu":
+        return made
+    import torch  # a sweep lists its runs without it
+
+    return f"{made}; {torch.cuda.get_device_name(device)}"
 
 
 def cost(run: Run, spent: dict[str, float], steps: int) -> dict[str, Any]:

@@ -61,7 +61,7 @@ class CostVecEnv(VecEnvWrapper):
         observation, _, done, infos = self.venv.step_wait()
         last = self.base.last
         errors = np.sum([self._error_cost(-last[name]) for name in self.errors], axis=0)
-        share = self._mean(errors) if self.cost.relative else np.ones(self.num_envs)
+        share = self._mean(errors) if self.cost.relative else 1.0
         made = last[EFFORT] - errors / share
         change = (self.action - self.before) / (self.high - self.low)
         moved = np.square(change, dtype=np.float64).sum(axis=1)

@@ -91,14 +91,14 @@ def find(kernel: "AddressKernel") -> bytes | None:
     return data if hashlib.sha256(data).hexdigest() == entry["sha256"].get(platform) else None
 
 
-def loads_here(data: bytes, cache: Path) -> bool:
-    """Return whether object code can be loaded on a platform where nobody has run it yet.
+def try_loading(data: bytes, cache: Path) -> None:
+    """Let a child process load object code on a platform where nobody has run it yet.
 
-    A child process tries it, once on a machine: LLVM ends a process that loads what it cannot use.
-    ``cache`` is the folder that holds the answer.
+    It does so once on a machine, since LLVM ends a process that loads what it cannot use. ``cache``
+    is the folder that holds the answer. A RuntimeError says that the child has failed.
     """
     if _codes()[0] in TRIED:
-        return True
+        return
     answer = cache / f"loads_{hashlib.sha256(data).hexdigest()[:16]}"
     known = read_whole(answer)
     if known is None:
@@ -107,7 +107,8 @@ def loads_here(data: bytes, cache: Path) -> bool:
         known = b"no" if done.returncode else b"yes"
         make_folder(cache)
         write_whole(answer, known)
-    return known == b"yes"
+    if known != b"yes":
+        raise RuntimeError("a process that loaded it has failed")
 
 
 def file_of(folder: Path, platform: str, name: str) -> Path:

@@ -94,7 +94,7 @@ class CudaDevice:
     """
 
     def __init__(self, number: int = 0) -> None:
-        self.name, self._number = f"cuda:{number}", number
+        self.name = f"cuda:{number}"
         self._torch: Any = None  # once it has tensors of the batch
         try:
             from cuda.core import LEGACY_DEFAULT_STREAM, Device
@@ -170,7 +170,8 @@ class CudaDevice:
 
     def check_stream(self) -> None:
         """Raise RuntimeError if torch queues its work in another stream than the device."""
-        if self._torch is not None and self._torch.cuda.current_stream(self._number).cuda_stream:
+        number = self._device.device_id
+        if self._torch is not None and self._torch.cuda.current_stream(number).cuda_stream:
             raise RuntimeError(
                 "torch uses another stream than the default one, in which the batch queues its "
                 "work; step outside torch.cuda.stream and torch.cuda.graph"
@@ -197,7 +198,7 @@ class CudaDevice:
                 "NumPy array"
             )
         self._copy(array, source.ptr)
-        self._stream.sync()  # the other library may reuse the memory
+        self.synchronise()  # the other library may reuse the memory
 
     def address(self, array: CudaArray) -> int:
         """Return the address of an array."""

@@ -1,6 +1,5 @@
 """The batch of environments on a device."""
 
-from contextlib import nullcontext
 from typing import Any
 
 import gymnasium as gym
@@ -22,6 +21,8 @@ BOOK = (
     *("actions", "observations", "report", "flags"),
 )
 """Arrays in the order of the address book."""
+SHARED = ("actions", "observations", "report", "flags")
+"""Those that torch has as tensors in the same memory."""
 DTYPES = ("float64", "float32")
 """Types of numbers that are neither integers nor observations."""
 
@@ -81,11 +82,11 @@ class DeviceVectorEnv(Batch):
         self.with_info = bool(info)
         self._torch = _torch()
         self._arrays = {name: self.device.upload(a) for name, a in self._initial().items()}
-        shared = () if self._torch is None else ("actions", "observations", "report", "flags")
-        with nullcontext() if self._torch is None else self._torch.inference_mode(False):
-            self._tensors = {
-                name: self.device.tensor(self._arrays[name], self._torch) for name in shared
-            }
+        if self._torch is not None:
+            with self._torch.inference_mode(False):
+                self._tensors = {
+                    name: self.device.tensor(self._arrays[name], self._torch) for name in SHARED
+                }
         book = np.zeros((len(BOOK), 4), np.int64)
         for row, name in zip(book, BOOK, strict=True):
             array = self._arrays[name]
