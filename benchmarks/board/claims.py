@@ -1,4 +1,4 @@
-"""Claims of a controller against the best paper controller of its track."""
+"""Claims of a controller against the best classical controller of its track."""
 
 import math
 from collections.abc import Sequence
@@ -20,21 +20,21 @@ BETTER, DEARER, NOT_SHOWN = "better", "better error, higher cost", "not shown to
 
 @dataclass(frozen=True)
 class Claim:
-    """Comparison of a controller with the best paper controller of its track."""
+    """Comparison of a controller with the best classical one of its track."""
 
     row: Row
-    paper: Row
+    rival: Row
     split: str
     probability: Interval  # of improvement of the headline, over training seeds and paired episodes
-    ratios: dict[str, float]  # cost ratios, infinite if the paper controller has no such cost
+    ratios: dict[str, float]  # cost ratios, infinite if the rival has no such cost
     verdict: str
     reasons: tuple[str, ...]  # violated conditions of BETTER
     gain: Interval  # relative reduction of the mean, paired by episode
     remarks: tuple[str, ...]  # numbers of settings tried for each side
 
 
-def is_paper(row: Row) -> bool:
-    """Return whether a row is of a paper's method or a textbook rule: classical, with a source.
+def is_rival(row: Row) -> bool:
+    """Return whether a row is of a classical controller with a source (a paper or a textbook).
 
     A controller that is designed from the plant of each episode is not: it knows more.
     """
@@ -42,77 +42,77 @@ def is_paper(row: Row) -> bool:
     return sourced and not views.is_informed(row)
 
 
-def best_paper(rows: Sequence[Row]) -> Row | None:
-    """Return the paper controller with the lowest audit (else public) mean; ``None`` without."""
-    return next((row for row in standings.ordered(rows) if is_paper(row)), None)
+def best_classical(rows: Sequence[Row]) -> Row | None:
+    """Return the classical row with the lowest audit (else public) mean; ``None`` without."""
+    return next((row for row in standings.ordered(rows) if is_rival(row)), None)
 
 
-def _matched(row: Row, rows: Sequence[Row], paper: Row) -> list[str]:
+def _matched(row: Row, rows: Sequence[Row], rival: Row) -> list[str]:
     """Return the objection to a lower error that may be due to the preview, if there is one.
 
-    If ``row`` uses preview and ``paper``, the best paper controller, none, it has to be better than
-    the best paper controller with preview as well.
+    If ``row`` uses preview and ``rival``, the best classical controller, none, it has to be better
+    than the best classical controller with preview as well.
     """
-    if not views.preview_of(row) or views.preview_of(paper):
+    if not views.preview_of(row) or views.preview_of(rival):
         return []
-    rival = best_paper([other for other in rows if views.preview_of(other)])
-    found = None if rival is None else standings.improvement(row, rival)
-    if rival is None or found is None:
-        return [f"uses {views.preview_of(row):g} s of preview, no paper controller does"]
+    other = best_classical([one for one in rows if views.preview_of(one)])
+    found = None if other is None else standings.improvement(row, other)
+    if other is None or found is None:
+        return [f"uses {views.preview_of(row):g} s of preview, no classical controller does"]
     if found.value > PROBABILITY and found.low > LOWER_BOUND:
         return []
-    return [f"P {found.value:.2f} against {views.name_of(rival)}, which uses preview as well"]
+    return [f"P {found.value:.2f} against {views.name_of(other)}, which uses preview as well"]
 
 
-def cost_ratios(row: Row, paper: Row, split: str) -> dict[str, float]:
-    """Return each cost over the paper controller's, means over the episodes of a split."""
+def cost_ratios(row: Row, rival: Row, split: str) -> dict[str, float]:
+    """Return each cost over the rival's, means over the episodes of a split."""
     known = of_track(views.content_of(row))
     return {
-        name: _ratio(row, paper, metric, split) for metric, name in COSTS.items() if metric in known
+        name: _ratio(row, rival, metric, split) for metric, name in COSTS.items() if metric in known
     }
 
 
-def _ratio(row: Row, paper: Row, metric: str, split: str) -> float:
-    ours, theirs = (views.mean_of(r, metric, split) for r in (row, paper))
+def _ratio(row: Row, rival: Row, metric: str, split: str) -> float:
+    ours, theirs = (views.mean_of(r, metric, split) for r in (row, rival))
     floor = COST_FLOOR.get(metric, 0.0)
     if ours <= floor:  # counts as none
         return min(1.0, ours / theirs) if theirs > 0.0 else 1.0
     return ours / max(theirs, floor) if max(theirs, floor) > 0.0 else math.inf
 
 
-def claim(row: Row, paper: Row, doubts: Sequence[str] = ()) -> Claim | None:
+def claim(row: Row, rival: Row, doubts: Sequence[str] = ()) -> Claim | None:
     """Return the claim of a row; ``None`` if the two have not run the same episodes."""
-    split, probability = views.common_split(row, paper), standings.improvement(row, paper)
+    split, probability = views.common_split(row, rival), standings.improvement(row, rival)
     if split is None or probability is None:
         return None
-    ratios, gained = cost_ratios(row, paper, split), gain(row, paper, split)
-    against = [*_doubts(row, paper, probability, gained, split), *doubts]
+    ratios, gained = cost_ratios(row, rival, split), gain(row, rival, split)
+    against = [*_doubts(row, rival, probability, gained, split), *doubts]
     costs = [f"{name} {ratio:.2f}x" for name, ratio in ratios.items() if not ratio <= COST_RATIO]
     verdict = NOT_SHOWN if against else DEARER if costs else BETTER
     reasons = (*against, *costs)
     return Claim(
-        row, paper, split, probability, ratios, verdict, reasons, gained, _budgets(row, paper)
+        row, rival, split, probability, ratios, verdict, reasons, gained, _budgets(row, rival)
     )
 
 
-def gain(row: Row, paper: Row, split: str) -> Interval:
-    """Return the relative reduction of the mean against the paper controller."""
-    more, whole = standings.difference(row, paper), views.mean_of(paper, split=split)
+def gain(row: Row, rival: Row, split: str) -> Interval:
+    """Return the relative reduction of the mean against the rival."""
+    more, whole = standings.difference(row, rival), views.mean_of(rival, split=split)
     if more is None or not whole > 0.0:
         return NOTHING
     return Interval(-more.value / whole, -more.high / whole, -more.low / whole)
 
 
-def _budgets(row: Row, paper: Row) -> tuple[str, ...]:
+def _budgets(row: Row, rival: Row) -> tuple[str, ...]:
     """Return a remark if the numbers of settings tried differ."""
-    mine, theirs = (views.cost_of(each).trials for each in (row, paper))
+    mine, theirs = (views.cost_of(each).trials for each in (row, rival))
     if mine == theirs:
         return ()
     words = ["by hand" if count is None else str(count) for count in (mine, theirs)]
-    return (f"settings tried: {words[0]}, paper's {words[1]}",)
+    return (f"settings tried: {words[0]}, {words[1]} for {views.name_of(rival)}",)
 
 
-def _doubts(row: Row, paper: Row, probability: Interval, gained: Interval, split: str) -> list[str]:
+def _doubts(row: Row, rival: Row, probability: Interval, gained: Interval, split: str) -> list[str]:
     """Return the objections to a lower error, each in a few words."""
     doubts = []
     if not probability.value > PROBABILITY:
@@ -123,32 +123,32 @@ def _doubts(row: Row, paper: Row, probability: Interval, gained: Interval, split
         doubts.append("lower in most episodes, not in the mean")
     elif not gained.low > 0.0:
         doubts.append("the interval of the mean's gain holds zero")
-    mine, theirs = (each["controller"]["knowledge"] for each in (row, paper))
+    mine, theirs = (each["controller"]["knowledge"] for each in (row, rival))
     if knowledge.is_ahead(mine, theirs):
         doubts.append(
-            f"knows the plant ({mine}) that differs from the model of {views.name_of(paper)}"
+            f"knows the plant ({mine}) that differs from the model of {views.name_of(rival)}"
         )
     seeds = views.training_seeds(row)
     if not views.is_classical(row) and seeds < CLAIM_SEEDS:
         doubts.append(f"{seeds} training seed{'s' * (seeds != 1)}, a claim needs {CLAIM_SEEDS}")
-    (failed, total), (failed_too, of) = (views.failures_of(r, split) for r in (row, paper))
+    (failed, total), (failed_too, of) = (views.failures_of(r, split) for r in (row, rival))
     if failed / total > failed_too / of:
         doubts.append(f"{failed} of {total} episodes failed")
     if not views.is_audited(row):
         doubts.append("not audited")
-    elif not views.is_audited(paper):
-        doubts.append(f"{views.name_of(paper)} not audited")
+    elif not views.is_audited(rival):
+        doubts.append(f"{views.name_of(rival)} not audited")
     return doubts
 
 
 def learned_claims(rows: Sequence[Row]) -> list[Claim]:
     """Return the claims of a track's learned and residual rows, the likeliest first."""
-    paper = best_paper(rows)
-    if paper is None:
+    rival = best_classical(rows)
+    if rival is None:
         return []
-    doubts = _doubts_of_track(rows, paper)
+    doubts = _doubts_of_track(rows, rival)
     learned = [row for row in standings.ordered(rows) if not views.is_classical(row)]
-    made = [claim(row, paper, [*doubts, *_matched(row, rows, paper)]) for row in learned]
+    made = [claim(row, rival, [*doubts, *_matched(row, rows, rival)]) for row in learned]
     order = (BETTER, DEARER, NOT_SHOWN)
 
     def rank(entry: Claim) -> tuple[int, bool, float]:
@@ -157,12 +157,12 @@ def learned_claims(rows: Sequence[Row]) -> list[Claim]:
     return sorted((entry for entry in made if entry is not None), key=rank)
 
 
-def _doubts_of_track(rows: Sequence[Row], paper: Row) -> list[str]:
-    """Return the reasons why another paper controller may be the best."""
+def _doubts_of_track(rows: Sequence[Row], rival: Row) -> list[str]:
+    """Return the reasons why another classical controller may be the best."""
     listing = standings.listing(rows)
     doubts = [f"{name} is in the audit round and has no row" for name in listing.missing]
-    best, public = views.name_of(paper), views.mean_of(paper, split=PUBLIC)
-    for row in filter(is_paper, listing.outside):
-        if row is not paper and views.mean_of(row) < public:
+    best, public = views.name_of(rival), views.mean_of(rival, split=PUBLIC)
+    for row in filter(is_rival, listing.outside):
+        if row is not rival and views.mean_of(row) < public:
             doubts.append(f"{views.name_of(row)}, not audited, is below {best} on public episodes")
     return doubts

@@ -98,11 +98,11 @@ def _track(ordered: Track, figure: str | None) -> list[str]:
 
 
 def _verdicts(ordered: Track, made: Sequence[Claim]) -> list[str]:
-    """Return the best paper controller and the claim of each learned one against it."""
-    paper = claims.best_paper(ordered)
-    if paper is None:
+    """Return the best classical controller and the claim of each learned one against it."""
+    rival = claims.best_classical(ordered)
+    if rival is None:
         return []
-    lines = [f"- Best paper controller: `{views.name_of(paper)}`."]
+    lines = [f"- Best classical controller: `{views.name_of(rival)}`."]
     for entry in made:
         lines.append(
             f"- `{views.name_of(entry.row)}`: {full_verdict(entry)}; lower by "

@@ -10,7 +10,7 @@ Table = tuple[list[str], list[list[str]]]  # heading and lines
 WIDTH = 150  # largest number of characters of a table's line; a wider table is split
 LEFT = {
     *("controller", "environment", "track", "knows", "verdict", "kind", "state", "episodes"),
-    *("best paper controller<br>best learned", "first here", "tuning", "hardware"),
+    *("best learned", "oracle", "unit", "first here", "tuning", "hardware"),
     *("best classical", "paper's controller", "best without preview", "best with preview"),
     *("best other", "result", "matched"),
 }

@@ -87,7 +87,7 @@ def is_beyond(row: Row) -> bool:
 def is_as_published(row: Row) -> bool:
     """Return whether a row is of a controller as published or by a textbook rule."""
     untuned = views.cost_of(row).trials == 0 and not views.preview_of(row)
-    return claims.is_paper(row) and untuned and not is_beyond(row)
+    return claims.is_rival(row) and untuned and not is_beyond(row)
 
 
 def best(rows: Sequence[Row], accepted: Callable[[Row], bool]) -> Row | None:

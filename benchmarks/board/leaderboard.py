@@ -11,7 +11,7 @@ from benchmarks.board import accessors as views
 from benchmarks.board import gap, plots, standings
 from benchmarks.board.environment_page import page_text
 from benchmarks.board.format import number, table
-from benchmarks.board.summary import board_text
+from benchmarks.board.summary import board_text, excerpt
 from benchmarks.board.words import Cells, by_controller, short_env
 from benchmarks.bounds import run as bounding
 from benchmarks.bounds.run import Bounds
@@ -24,6 +24,11 @@ from pam_envs.files import write_text
 BOARD = Path(__file__).parents[1] / "LEADERBOARD.md"
 MARKUP = re.compile(r"([\\`\[\]])")
 """Characters that begin links, images and code in Markdown."""
+README = Path(__file__).parents[2] / "README.md"
+EXCERPT = re.compile(
+    r"(<!-- leaderboard excerpt: begin -->\n).*?(\n<!-- leaderboard excerpt: end -->)", re.DOTALL
+)
+"""Marks of the table in README that the board writes."""
 PAGES = "leaderboard"  # folder of the pages beside the board, with the figures and the times
 
 
@@ -51,7 +56,7 @@ def files(
     tracks = standings.tracks(all_rows)
     grouped = standings.by_env(tracks)
     pages = {env: f"{PAGES}/{short_env(env)}.md" for env in grouped}
-    texts = {BOARD.name: board_text(all_rows, pages)}
+    texts = {BOARD.name: board_text(all_rows, pages, bounds)}
     for env, held in grouped.items():
         figures = {track: f"figures/{track}.svg" for track in held}
         texts[pages[env]] = page_text(short_env(env), held, figures)
@@ -73,13 +78,25 @@ def _escaped(value: Any) -> Any:
 
 
 def write(folder: Path = rows.RESULTS, board: Path = BOARD) -> list[Path]:
-    """Write the board, its pages, figures and times in place of earlier ones; return paths."""
-    texts = files(load(folder), bounding.read(folder))
+    """Write the board, its pages, figures and times in place of earlier ones; return paths.
+
+    The board of the checkout also writes its excerpt in README.
+    """
+    loaded, bounds = load(folder), bounding.read(folder)
+    texts = files(loaded, bounds)
     first = texts.pop(BOARD.name)
     pages = {name.removeprefix(f"{PAGES}/"): text for name, text in texts.items()}
     written = write_folder(board.parent / PAGES, pages)
     write_text(board, first)
-    return [board, *written]
+    if board != BOARD:
+        return [board, *written]
+    write_text(README, with_excerpt(README.read_text(encoding="utf-8"), loaded, bounds))
+    return [board, README, *written]
+
+
+def with_excerpt(text: str, all_rows: Sequence[Row], bounds: Mapping[str, Bounds]) -> str:
+    """Return the text of README with the table of the rows between its marks."""
+    return EXCERPT.sub(lambda m: f"{m[1]}{excerpt(all_rows, bounds)}{m[2]}", text)
 
 
 def times_text(all_rows: Sequence[Row]) -> str:

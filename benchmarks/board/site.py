@@ -101,7 +101,7 @@ def _track(name: str, ordered: Track) -> dict[str, Any]:
     content = views.content_of(first)
     unit, factor = views.unit_of(first)
     columns, headlines = columns_of(content), views.headlines(first)
-    paper = claims.best_paper(ordered)
+    rival = claims.best_classical(ordered)
     return {
         "name": name,
         "title": str(content["title"]),
@@ -112,7 +112,7 @@ def _track(name: str, ordered: Track) -> dict[str, Any]:
         "digest": first["scenarios"]["digest"],
         "unit": unit,
         "factor": factor,
-        "paper": "" if paper is None else views.name_of(paper),
+        "rival": "" if rival is None else views.name_of(rival),
         "figure": f"figures/{name}.svg",
         "columns": [title for _, title, _ in columns],
         "headlines": [title for _, title, _ in headlines],
@@ -209,14 +209,14 @@ def again(row: Row, cost: views.Cost) -> list[str]:
     ]
 
 
-def _winner(found: board_summary.Winner) -> dict[str, Any]:
-    paper, entry = found.paper, found.claim
+def _winner(found: board_summary.Best) -> dict[str, Any]:
+    rival, entry = found.classical, found.claim
     return {
         "env": found.env,
         "track": found.track,
         "split": found.split,
-        "paper": views.name_of(paper) if paper else "none",
-        "paper_scores": words.scores_by_title(paper, found.split),
+        "rival": views.name_of(rival) if rival else "none",
+        "rival_scores": words.scores_by_title(rival, found.split),
         "learned": views.name_of(entry.row) if entry else "none",
         "learned_scores": words.scores_by_title(found.learned, found.split),
         "chance": _numbers(entry.probability) if entry else None,

@@ -1,21 +1,31 @@
-"""Summary of the board: learned against paper controllers, rank changes, pages, explanations."""
+"""Summary of the board: best controllers, claims, rank changes, pages, explanations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
 
 from benchmarks.board import accessors as views
-from benchmarks.board import claims, standings
+from benchmarks.board import claims, gap, standings
 from benchmarks.board.claims import Claim
-from benchmarks.board.format import chance, number, percent, tables
+from benchmarks.board.format import chance, number, percent, table, tables
 from benchmarks.board.standings import Track
-from benchmarks.board.words import change_cells, full_verdict, largest_cost, score_words, short_env
+from benchmarks.board.words import (
+    change_cells,
+    full_verdict,
+    largest_cost,
+    score_words,
+    scores_by_title,
+    short_env,
+)
+from benchmarks.bounds.run import Bounds
 from benchmarks.runs.rows import Row
-from benchmarks.scoring.group import Column
+from benchmarks.scoring.metrics import headline_of
 
 Tracks = Mapping[str, Track]
-CONTROLLERS = "best paper controller<br>best learned"
-"""Heading of the two names, each cell beside them with a line for each."""
+NO_BOUNDS: Mapping[str, Bounds] = MappingProxyType({})
 READING = Path(__file__).with_name("reading.md")  # explanation of the tables
 NO_ROWS = "There are no rows yet: run `python -m benchmarks run`."
 INTRODUCTION = """\
@@ -27,7 +37,20 @@ environment has a page with its tracks and all its controllers; a page shows the
 `verify ROW` computes it again, `cite ROW` prints BibTeX, and `python -m benchmarks site` writes an
 interactive page with trajectories.
 """
-NOMINAL = "*P* is the probability of improvement. With 95 % intervals, costs and reasons:"
+BEST = """\
+RMS with its 95 % interval, *EMG effort* of the gait environments, and the share of episodes that
+reached their end if some did not. *Paper's controller*: the best one as published or by a textbook
+rule, without preview and without tuning. *Best classical*: tuned or not. *Oracle*: a predictive
+controller with the true plant, on fewer episodes ([distance from it](leaderboard/gap.md)).
+"""
+NEAREST = """\
+The learned controller nearest to a claim in each track, against the best classical one. *P* is the
+probability of improvement; 95 % intervals, the largest ratio of costs, and what is missing to
+*better* in brackets."""
+EXCERPT = """\
+Nine environments, {count}, all scored on audit episodes: their seeds were drawn after every
+controller had been committed. RMS error on the nominal plant / on plants with drawn parameters:
+"""
 RANK_CHANGES = """\
 Each track against the nominal one of its environment, among the controllers that have run in all
 of them. *Nominal place*: place of the leaders in the nominal track. Kendall's tau is 1 for the same
@@ -35,25 +58,41 @@ order.
 """
 
 
-@dataclass(frozen=True)
-class Winner:
-    """The best paper controller of a track and the learned controller nearest to a claim.
+KINDS = ("nominal", "randomised", "wrong_model", "everyday")
+"""Endings of the tracks of the first table."""
+SIDES = ("paper's controller", "best classical", "best learned", "oracle")
+"""Columns of the first table."""
 
-    ``headlines`` are the metrics beside the RMS of the track.
+
+@dataclass(frozen=True)
+class Best:
+    """The best controllers of a track.
+
+    Attributes
+    ----------
+    paper : dict, optional
+        Row of the best controller as published, without preview and without tuning.
+    classical : dict, optional
+        Row of the best classical controller with a source.
+    claim : Claim, optional
+        Of the learned controller nearest to a claim, against the classical one.
+    oracle : Bounds, optional
+        Bounds of the task of these rows.
     """
 
     env: str
     track: str
-    headlines: tuple[Column, ...]
     paper: Row | None
+    classical: Row | None
     claim: Claim | None
+    oracle: Bounds | None
 
     @property
     def split(self) -> str:
-        """Split of the episodes on which the two are compared."""
+        """Split of the episodes on which learned and classical controllers are compared."""
         if self.claim is not None:
             return self.claim.split
-        return "" if self.paper is None else views.published_split(self.paper)
+        return "" if self.classical is None else views.published_split(self.classical)
 
     @property
     def learned(self) -> Row | None:
@@ -63,30 +102,44 @@ class Winner:
     @property
     def silence(self) -> str:
         """Reason why there is no claim."""
-        if self.paper is None:
-            return "no paper controller to compare with"
+        if self.classical is None:
+            return "no classical controller to compare with"
         return "no learned controller has been run"
 
 
-def nominal(tracks: Tracks) -> dict[str, Winner]:
-    """Return the leaders of each environment's nominal track (of all tracks if none is nominal)."""
+def best_of(track: str, rows: Sequence[Row], bounds: Mapping[str, Bounds]) -> Best:
+    """Return the best controllers of a track; bounds of another task count as none."""
+    made, found = claims.learned_claims(rows), bounds.get(track)
+    known = found if found is not None and found.task == rows[0]["task"] else None
+    return Best(
+        views.env_of(rows[0]),
+        track,
+        gap.best(rows, gap.is_as_published),
+        claims.best_classical(rows),
+        made[0] if made else None,
+        known,
+    )
+
+
+def nominal(tracks: Tracks, bounds: Mapping[str, Bounds] = NO_BOUNDS) -> dict[str, Best]:
+    """Return the best of each environment's nominal track (of all tracks if none is nominal)."""
     chosen = {name: rows for name, rows in tracks.items() if "nominal" in name} or dict(tracks)
-    found = {}
-    for name, rows in chosen.items():
-        made = claims.learned_claims(rows)
-        nearest = made[0] if made else None
-        about = (views.env_of(rows[0]), name, views.headlines(rows[0]))
-        found[name] = Winner(*about, claims.best_paper(rows), nearest)
-    return found
+    return {name: best_of(name, rows, bounds) for name, rows in chosen.items()}
 
 
-def board_text(all_rows: Sequence[Row], pages: Mapping[str, str] | None = None) -> str:
+def board_text(
+    all_rows: Sequence[Row],
+    pages: Mapping[str, str] | None = None,
+    bounds: Mapping[str, Bounds] = NO_BOUNDS,
+) -> str:
     """Return LEADERBOARD.md; ``pages`` are the environments' paths relative to it."""
     tracks = standings.tracks(all_rows)
     if not tracks:
         return f"{INTRODUCTION}\n{NO_ROWS}\n"
+    found = {name: best_of(name, rows, bounds) for name, rows in tracks.items()}
     lines = [*INTRODUCTION.splitlines(), "", verified_words(all_rows), ""]
-    lines += ["## Nominal tracks", "", *_winners(tracks), ""]
+    lines += ["## Best controllers", "", *_best_controllers(found), ""]
+    lines += ["## Learned against classical controllers", "", *_learned(found), ""]
     lines += ["## Rank changes between tracks", "", *_rank_changes(tracks), ""]
     lines += ["## Environments", "", *_environments(tracks, pages or {}), ""]
     if words := _budgets(all_rows):
@@ -94,53 +147,94 @@ def board_text(all_rows: Sequence[Row], pages: Mapping[str, str] | None = None) 
     return "\n".join([*lines, READING.read_text(encoding="utf-8")])
 
 
-def _winners(tracks: Tracks) -> list[str]:
-    """Return tables of the nominal tracks, and a line with intervals and reasons for each.
-
-    Tracks with the same headlines form a table.
-    """
-    found, lines = list(nominal(tracks).values()), list[str]()
-    for headlines in dict.fromkeys(winner.headlines for winner in found):
-        scores = ["RMS", *(title for _, title, _ in headlines)]
-        heading = ["environment", CONTROLLERS, *scores, "lower by", "P", "verdict"]
-        chosen = [winner for winner in found if winner.headlines == headlines]
-        lines += [*tables(heading, [_line(winner) for winner in chosen]), ""]
-    return [*lines, NOMINAL, "", *map(_detail, found)]
-
-
-def _line(found: Winner) -> list[str]:
-    entry = found.claim
-    both = [_scores(row, found) for row in (found.paper, found.learned)]
-    cells = [f"`{short_env(found.env)}`", *map("<br>".join, zip(*both, strict=True))]
-    if entry is None:
-        return [*cells, "-", "-", found.silence]
-    bold = f"**{entry.verdict}**" if entry.verdict == claims.BETTER else entry.verdict
-    return [*cells, f"{100.0 * entry.gain.value:+.2g} %", f"{entry.probability.value:.2f}", bold]
+def _best_controllers(found: Mapping[str, Best]) -> list[str]:
+    """Return the table of every environment, nominal and with other plants."""
+    lines = []
+    for kind in KINDS:
+        for name, best in found.items():
+            if name.endswith(f"_{kind}"):
+                where = f"`{short_env(best.env)}`<br>{kind.replace('_', ' ')}"
+                rows = (best.paper, best.classical, best.learned)
+                lines.append([where, *map(_scores, rows), _bound(best)])
+    if not lines:
+        return ["There is no row of a track of these kinds yet."]
+    return [*BEST.splitlines(), "", *table(["environment", *SIDES], lines)]
 
 
-def _scores(row: Row | None, found: Winner) -> list[str]:
-    """Return the name of a controller and its headlines."""
+def _scores(row: Row | None) -> str:
+    """Return name, headlines and failures of a controller, in a cell of some lines."""
     if row is None:
-        return ["none", *("-" for _ in ("RMS", *found.headlines))]
+        return "-"
+    scores = scores_by_title(row, views.published_split(row))
+    made = [f"`{views.name_of(row)}`", scores.pop("RMS")]
+    made += [f"{title} {value}" for title, value in scores.items()]
+    failed, total = views.failures_of(row)
+    if failed:
+        made.append(f"success {100.0 * (1.0 - failed / total):.3g} %")
+    return "<br>".join(made)
+
+
+def _bound(best: Best) -> str:
+    """Return the mean of the oracle, with its other headlines."""
+    row = best.classical or best.paper
+    if best.oracle is None or row is None:
+        return "-"
     unit, factor = views.unit_of(row)
-    score = f"{number(factor * views.mean_of(row, split=found.split))} {unit}"
-    more = [number(by * views.mean_of(row, name, found.split)) for name, _, by in found.headlines]
-    return [f"`{views.name_of(row)}`", score, *more]
+    shown = [(headline_of(views.content_of(row)), unit, factor)]
+    shown += [(metric, title, by) for metric, title, by in views.headlines(row)]
+    episodes = best.oracle.episodes
+    means = [by * float(np.mean([e.scores[metric] for e in episodes])) for metric, _, by in shown]
+    first, *more = zip(means, (word for _, word, _ in shown), strict=True)
+    return "<br>".join([f"{number(first[0])} {first[1]}", *(f"{w} {number(m)}" for m, w in more)])
 
 
-def _detail(found: Winner) -> str:
-    """Return the intervals, the largest cost and the reasons of a nominal track's claim."""
-    paper, entry = found.paper, found.claim
-    words = f"- `{short_env(found.env)}`, {found.split or 'no'} episodes: "
-    if paper is not None:
-        words += f"`{views.name_of(paper)}` {score_words(paper, found.split)}"
-    if entry is None:
-        return f"{words}; {found.silence}"
+def _learned(found: Mapping[str, Best]) -> list[str]:
+    """Return a line for each track: intervals, largest cost and reasons of the learned claim."""
+    every = [best for best in found.values() if best.claim is not None]
+    silent = sorted({short_env(b.env) for b in found.values()} - {short_env(b.env) for b in every})
+    lines = [NEAREST, "", *map(_detail, every)] if every else []
+    if silent:
+        words = ", ".join(f"`{name}`" for name in silent)
+        lines += [""] * bool(lines) + [f"No learned controller has been run in {words}."]
+    return lines
+
+
+def _detail(best: Best) -> str:
+    """Return the comparison of a track's learned controller with the best classical one."""
+    entry = best.claim
+    assert entry is not None and best.classical is not None
     return (
-        f"{words}, `{views.name_of(entry.row)}` {score_words(entry.row, entry.split)}; lower by "
-        f"{percent(entry.gain)}; P(improvement) {chance(entry.probability)}; largest cost "
+        f"- {best.track}: `{views.name_of(entry.row)}` {score_words(entry.row, entry.split)} "
+        f"against `{views.name_of(best.classical)}` {score_words(best.classical, entry.split)}; "
+        f"lower by {percent(entry.gain)}; P(improvement) {chance(entry.probability)}; largest cost "
         f"{largest_cost(entry)}; {full_verdict(entry)}"
     )
+
+
+def excerpt(all_rows: Sequence[Row], bounds: Mapping[str, Bounds] = NO_BOUNDS) -> str:
+    """Return the table of README: RMS on the nominal tracks and on those with drawn plants."""
+    tracks, lines = standings.tracks(all_rows), []
+    for name in tracks:
+        pair = [name, name.replace("_nominal", "_randomised")]
+        if pair[0] == pair[1] or not all(one in tracks for one in pair):
+            continue
+        found = [best_of(one, tracks[one], bounds) for one in pair]
+        cells = [
+            "-" if set(both) == {"-"} else " / ".join(both)
+            for both in zip(*map(_short, found), strict=True)
+        ]
+        lines.append([f"`{short_env(found[0].env)}`", views.unit_of(tracks[name][0])[0], *cells])
+    count = f"{len(tracks)} tracks and {len(all_rows)} rows"
+    return "\n".join([EXCERPT.format(count=count), *table(["environment", "unit", *SIDES], lines)])
+
+
+def _short(best: Best) -> list[str]:
+    """Return the RMS of each side, in the unit of the track."""
+    rows = (best.paper, best.classical, best.learned)
+    made = [
+        "-" if row is None else number(views.unit_of(row)[1] * views.mean_of(row)) for row in rows
+    ]
+    return [*made, _bound(best).partition(" ")[0]]
 
 
 def _rank_changes(tracks: Tracks) -> list[str]:

@@ -72,7 +72,7 @@ def score_words(row: Row, split: str) -> str:
 
 
 def largest_cost(entry: Claim) -> str:
-    """Return the cost whose ratio to the paper controller's is the largest."""
+    """Return the cost whose ratio to the classical controller's is the largest."""
     name, ratio = max(entry.ratios.items(), key=lambda item: item[1])
     return f"{number(ratio)}x {name}"
 

@@ -28,15 +28,15 @@ function unpackAll(signals) {
   return Object.fromEntries(Object.entries(signals).map(([name, packed]) => [name, unpack(packed)]));
 }
 
-function pictures(track, row, paper, number) {
+function pictures(track, row, rival, number) {
   const ours = traces[row.row][number];
-  const theirs = paper && traces[paper.row].find((t) => t.scenario === ours.scenario && t.seed === ours.seed);
+  const theirs = rival && traces[rival.row].find((t) => t.scenario === ours.scenario && t.seed === ours.seed);
   const scaled = (trace, name, factor) => trace.values[name].map((value) => factor * value);
   const clock = (trace) => trace.values.output.map((_, i) => trace.start + i * trace.step);
   const t = clock(ours), wanted = scaled(ours, "reference", track.factor);
   const output = scaled(ours, "output", track.factor);
   const others = theirs && theirs !== ours ? [theirs] : [];
-  const name = row.controller, other = paper?.controller ?? "";
+  const name = row.controller, other = rival?.controller ?? "";
   const follow = [
     ...others.map((trace) => ({ x: clock(trace), y: scaled(trace, "output", track.factor), kind: "theirs", name: other })),
     { x: t, y: wanted, kind: "wanted", name: "reference" },
@@ -70,17 +70,17 @@ function pictures(track, row, paper, number) {
   return make("div", { class: "pictures" }, time, loops);
 }
 
-function tracesPart(track, row, paper) {
+function tracesPart(track, row, rival) {
   const part = make("div", { class: "traces" });
   if (!row.traces) { part.append(make("p", { class: "note" }, "No trajectories in this row.")); return part; }
-  const rows = [row.row, ...(paper?.traces ? [paper.row] : [])];
+  const rows = [row.row, ...(rival?.traces ? [rival.row] : [])];
   Promise.all(rows.map(loaded)).then(() => {
     const holder = make("div", {}), choice = make("select", { class: "episode" });
     traces[row.row].forEach((trace, k) => {
       const trained = trace.training_seed === null ? "" : `, training seed ${trace.training_seed}`;
       choice.append(make("option", { value: k }, `${trace.scenario}, seed ${trace.seed}${trained}`));
     });
-    const draw = () => holder.replaceChildren(pictures(track, row, paper?.traces ? paper : null, Number(choice.value)));
+    const draw = () => holder.replaceChildren(pictures(track, row, rival?.traces ? rival : null, Number(choice.value)));
     choice.addEventListener("change", draw);
     part.replaceChildren(make("label", {}, "Episode (public) ", choice), holder);
     draw();
@@ -110,10 +110,10 @@ function costText({ steps, seconds, trials, tuning, hardware }) {
   return parts.join("; ");
 }
 
-function detail(track, row, paper) {
+function detail(track, row, rival) {
   const part = make("div", { class: "detail" });
   part.append(make("p", {}, `${row.summary}. `, make("span", { class: "soft" }, row.citation)));
-  part.append(tracesPart(track, row, paper));
+  part.append(tracesPart(track, row, rival));
   part.append(make("h3", {}, "Every metric"), values(track.columns, row.metrics));
   if (track.settings.length) part.append(make("h3", {}, `RMS [${track.unit}] by setting`), values(track.settings, row.settings));
   const trained = Object.keys(row.trainings), unit = track.unit;

@@ -43,9 +43,9 @@ function chance(interval) {
   return `${value} [${low}, ${high}]`;
 }
 
-// An interval on the track's common logarithmic scale, with a line where the paper controller is;
+// An interval on the track's common logarithmic scale, with a line where the rival controller is;
 // an arrow for what lies beyond the scale.
-function intervalPicture(interval, range, paper) {
+function intervalPicture(interval, range, rival) {
   const width = 150, height = 16;
   const svg = shape("svg", { width, height, role: "img" });
   const [low, high] = range.map((value) => Math.log(value));
@@ -53,8 +53,8 @@ function intervalPicture(interval, range, paper) {
     const share = (Math.log(Math.max(value, 1e-12)) - low) / (high - low || 1);
     return 4 + (width - 14) * Math.min(1, Math.max(0, share));
   };
-  if (paper > 0) {
-    svg.append(shape("line", { class: "theirs", x1: place(paper), x2: place(paper), y1: 0, y2: height }));
+  if (rival > 0) {
+    svg.append(shape("line", { class: "theirs", x1: place(rival), x2: place(rival), y1: 0, y2: height }));
   }
   svg.append(shape("line", { class: "ours", x1: place(interval[1]), x2: place(interval[2]), y1: 8, y2: 8 }));
   const mark = interval[0] > range[1]

@@ -25,11 +25,11 @@ function go(changes) {
 // Columns of the track's table: heading, what is shown, what is sorted by.
 function columns(track) {
   const some = (name) => track.rows.some((row) => row[name]);
-  const paper = track.rows.find((row) => row.controller === track.paper)?.score?.[0];
+  const rival = track.rows.find((row) => row.controller === track.rival)?.score?.[0];
   const scores = track.rows.map((row) => row.score).filter(Boolean);
   const lows = scores.map(([, low]) => low).filter((value) => value > 0);
   const lowest = Math.min(1e9, ...lows), highest = Math.max(0, ...scores.map(([, , high]) => high));
-  const range = [lowest, Math.max(Math.min(highest, 10 * (paper || lowest)), 2 * lowest)];
+  const range = [lowest, Math.max(Math.min(highest, 10 * (rival || lowest)), 2 * lowest)];
   const step = (row) => row.step_us?.[0] ?? null;
   return [
     { key: "rank", title: "rank", value: (r) => r.place ?? 999, show: (r) => r.rank, number: true },
@@ -37,7 +37,7 @@ function columns(track) {
     { key: "kind", title: "kind", value: (r) => r.kind + String(r.seeds).padStart(4, "0"), show: (r) => (r.seeds ? `${r.kind}, ${r.seeds} seed${r.seeds === 1 ? "" : "s"}` : r.kind), kind: "short" },
     { key: "knows", title: "knows", value: (r) => r.knows, show: (r) => r.knows, kind: "short" },
     { key: "score", title: `${track.split} RMS [${track.unit}] [95 %]`, value: (r) => r.score?.[0] ?? null, show: (r) => bounded(r.score), number: true },
-    { key: "picture", title: "", show: (r) => (r.score ? intervalPicture(r.score, range, paper) : "–") },
+    { key: "picture", title: "", show: (r) => (r.score ? intervalPicture(r.score, range, rival) : "–") },
     ...track.headlines.map((title, k) => ({
       key: `h${k}`, title: `${title} [95 %]`, value: (r) => r.headlines[k]?.[0] ?? null, show: (r) => bounded(r.headlines[k]), number: true,
     })),
@@ -101,17 +101,17 @@ function rowLine(track, row, chosen) {
 
 function renderRows() {
   const track = byName[state.track], chosen = columns(track), table = at("rows");
-  const body = make("tbody"), paper = track.rows.find((row) => row.controller === track.paper);
+  const body = make("tbody"), rival = track.rows.find((row) => row.controller === track.rival);
   for (const group of BOARD.groups) {
     const rows = sorted(track.rows.filter((row) => row.group === group.name && kept(row)), chosen);
     if (rows.length && group.title) body.append(make("tr", { class: "apart" }, make("td", { colspan: chosen.length }, group.title)));
     for (const row of rows) {
       body.append(rowLine(track, row, chosen));
-      if (row.row === state.row) body.append(make("tr", { class: "inside" }, make("td", { colspan: chosen.length }, detail(track, row, paper))));
+      if (row.row === state.row) body.append(make("tr", { class: "inside" }, make("td", { colspan: chosen.length }, detail(track, row, rival))));
     }
   }
   table.replaceChildren(make("thead", {}, make("tr", {}, ...chosen.map(headingCell))), body);
-  at("about").textContent = `${track.about} Best paper controller: ${track.paper || "none"}.`;
+  at("about").textContent = `${track.about} Best classical controller: ${track.rival || "none"}.`;
   at("round").textContent = track.round;
   at("figure").src = track.figure;
   at("figure").alt = `Error against effort, and performance profiles: ${track.title}`;
@@ -134,9 +134,9 @@ function headed(heading, lines) {
 }
 
 function renderWinners() {
-  const titles = [...new Set(BOARD.winners.flatMap((entry) => Object.keys(entry.paper_scores)))];
+  const titles = [...new Set(BOARD.winners.flatMap((entry) => Object.keys(entry.rival_scores)))];
   const scores = titles.map((title) => `${title} [95 %]`);
-  const heading = ["environment", "verdict", "best paper controller", ...scores, "best learned controller", ...scores, "lower by [95 %]", "P [95 %]", "largest cost", "episodes", "in full"];
+  const heading = ["environment", "verdict", "best classical controller", ...scores, "best learned controller", ...scores, "lower by [95 %]", "P [95 %]", "largest cost", "episodes", "in full"];
   const scored = (name, found) => [
     make("td", { class: "name" }, name), ...titles.map((title) => make("td", { class: "short" }, found[title] ?? "–")),
   ];
@@ -145,7 +145,7 @@ function renderWinners() {
     line.append(
       make("td", { class: "name" }, entry.env),
       make("td", { class: entry.better ? "verdict good" : "verdict" }, entry.verdict.split(" (")[0]),
-      ...scored(entry.paper, entry.paper_scores), ...scored(entry.learned, entry.learned_scores),
+      ...scored(entry.rival, entry.rival_scores), ...scored(entry.learned, entry.learned_scores),
       make("td", { class: "short" }, entry.gain),
       make("td", { class: "short" }, chance(entry.chance)), make("td", {}, entry.cost),
       make("td", {}, entry.split || "–"), make("td", { class: "soft" }, entry.verdict),

@@ -12,7 +12,7 @@ from benchmarks.board.words import full_verdict
 from benchmarks.runs import knowledge
 
 TEN = np.linspace(0.4e-3, 0.6e-3, 10)
-PAPER = fakes.row("inverse", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)
+CLASSICAL = fakes.row("inverse", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)
 
 
 def learned(public: Any = TEN, **changes: Any) -> dict[str, Any]:
@@ -29,13 +29,13 @@ def in_round(*rows: dict[str, Any]) -> list[dict[str, Any]]:
     return list(rows)
 
 
-def verdict(row: dict[str, Any], paper: dict[str, Any] = PAPER) -> tuple[str, str]:
-    found = claims.claim(row, paper)
+def verdict(row: dict[str, Any], rival: dict[str, Any] = CLASSICAL) -> tuple[str, str]:
+    found = claims.claim(row, rival)
     return found.verdict, "; ".join(found.reasons)
 
 
 def test_ten_seeds_with_lower_error_at_no_higher_cost_are_better():
-    found = claims.claim(learned(), PAPER)
+    found = claims.claim(learned(), CLASSICAL)
     assert (found.verdict, found.reasons) == (claims.BETTER, ())
     assert found.split == "audit"
     assert found.probability.value == 1.0
@@ -84,14 +84,14 @@ def test_lower_error_in_most_episodes_but_not_in_mean_is_not_better():
 
 
 def test_gain_whose_interval_contains_zero_is_not_better():
-    found = claims.claim(learned([*np.full(39, 0.99e-3), 1.2e-3]), PAPER)
+    found = claims.claim(learned([*np.full(39, 0.99e-3), 1.2e-3]), CLASSICAL)
     assert found.probability.value > claims.PROBABILITY
     assert found.gain.low < 0.0 < found.gain.value
     assert found.reasons == ("the interval of the mean's gain holds zero",)
 
 
-def test_gain_is_relative_to_the_paper_controllers_mean():
-    found = claims.claim(learned(np.full(10, 0.75e-3)), PAPER)
+def test_gain_is_relative_to_the_classical_controllers_mean():
+    found = claims.claim(learned(np.full(10, 0.75e-3)), CLASSICAL)
     assert found.gain.value == pytest.approx(0.25)
     assert found.gain.low <= found.gain.value <= found.gain.high
 
@@ -108,12 +108,12 @@ def test_row_that_knows_the_plant_is_not_better_than_one_with_another_model(know
 
 @pytest.mark.parametrize(
     ("trials", "words"),
-    [(60, "settings tried: 60, paper's 0"), (None, "tried: by hand, paper's 0")],
+    [(60, "settings tried: 60, 0 for inverse"), (None, "tried: by hand, 0 for inverse")],
 )
 def test_unequal_budgets_are_shown_beside_the_verdict(trials, words):
     row = learned()
     row["controller"]["tuning"] = {"trials": trials, "how": "search"}
-    found = claims.claim(row, PAPER)
+    found = claims.claim(row, CLASSICAL)
     assert found.verdict == claims.BETTER
     assert words in full_verdict(found)
 
@@ -140,17 +140,17 @@ GROUND = {
 def test_row_selected_on_public_episodes_gains_no_claim(kind):
     changes, words = GROUND[kind]
     row = learned(**changes)
-    if "hair" in kind:  # as good as the paper controller, with the scatter that episodes have
+    if "hair" in kind:  # as good as the classical controller, with the scatter that episodes have
         random = np.random.default_rng(0)
         for episode in row["episodes"]:
             if episode["split"] == "audit":
                 episode["scores"]["rms_error"] *= 1.0 + 0.02 * float(random.normal())
-    (found,) = claims.learned_claims(in_round(PAPER, row))
+    (found,) = claims.learned_claims(in_round(CLASSICAL, row))
     assert found.verdict != claims.BETTER
     assert words in "; ".join(found.reasons)
-    places = standings.ranks(standings.ordered([row, PAPER]))
+    places = standings.ranks(standings.ordered([row, CLASSICAL]))
     better_unseen = views.mean_of(row, split="audit") < 1e-3
-    first = standings.ordered([row, PAPER])[0] is row
+    first = standings.ordered([row, CLASSICAL])[0] is row
     assert first == better_unseen
     if "above" in kind:
         assert [str(place) for place in places] == ["1", "2"]
@@ -160,29 +160,29 @@ def test_row_selected_on_public_episodes_gains_no_claim(kind):
 
 def test_failures_on_public_episodes_do_not_count_in_audit():
     unlucky = learned(public=TEN * 4, audit=TEN, failed=3)
-    (found,) = claims.learned_claims(in_round(PAPER, unlucky))
+    (found,) = claims.learned_claims(in_round(CLASSICAL, unlucky))
     assert found.verdict == claims.BETTER
 
 
 def test_without_a_round_nothing_is_better():
-    paper = fakes.row("inverse", 1e-3)
-    (found,) = claims.learned_claims([paper, learned(audit=None)])
+    rival = fakes.row("inverse", 1e-3)
+    (found,) = claims.learned_claims([rival, learned(audit=None)])
     assert (found.verdict, found.split) == (claims.NOT_SHOWN, "public")
     assert found.reasons[0] == "not audited"
 
 
-def test_better_paper_controller_outside_the_round_prevents_claims():
+def test_better_classical_controller_outside_the_round_prevents_claims():
     outside = fakes.row("inverse", 1e-3, constraint_cost=0.01, air_use=1e-5)
     (found,) = claims.learned_claims(in_round(learned(audit=2.5e-3), outside))
     assert found.verdict == claims.NOT_SHOWN
     assert "inverse not audited" in found.reasons
 
 
-def test_paper_controller_without_audit_is_still_compared():
+def test_classical_controller_without_audit_is_still_compared():
     outside = fakes.row("inverse", 0.1e-3)
     pid = fakes.row("pid", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)
     (found,) = claims.learned_claims(in_round(pid, outside, learned()))
-    assert views.name_of(found.paper) == "pid"
+    assert views.name_of(found.rival) == "pid"
     assert found.reasons == ("inverse, not audited, is below pid on public episodes",)
     worse = fakes.row("inverse", 3e-3)
     (found,) = claims.learned_claims(in_round(pid, worse, learned()))
@@ -190,7 +190,7 @@ def test_paper_controller_without_audit_is_still_compared():
 
 
 def test_round_entrant_without_row_prevents_claims():
-    rows = in_round(PAPER, learned())
+    rows = in_round(CLASSICAL, learned())
     for row in rows:
         row["audit"]["entrants"]["lost"] = "b" * 64
     (found,) = claims.learned_claims(rows)
@@ -202,26 +202,26 @@ def previewing(row: dict[str, Any]) -> dict[str, Any]:
     return row
 
 
-def test_learned_row_with_preview_has_to_beat_the_best_paper_controller_with_preview():
+def test_learned_row_with_preview_has_to_beat_the_best_classical_controller_with_preview():
     costs = {"constraint_cost": 0.01, "air_use": 1e-5}
-    (alone,) = claims.learned_claims(in_round(PAPER, previewing(learned())))
-    reason = "uses 0.2 s of preview, no paper controller does"
+    (alone,) = claims.learned_claims(in_round(CLASSICAL, previewing(learned())))
+    reason = "uses 0.2 s of preview, no classical controller does"
     assert (alone.verdict, alone.reasons) == (claims.NOT_SHOWN, (reason,))
     worse = previewing(fakes.row("ahead", 2e-3, audit=2e-3, **costs))
-    (beaten,) = claims.learned_claims(in_round(PAPER, worse, previewing(learned())))
-    assert (beaten.verdict, views.name_of(beaten.paper)) == (claims.BETTER, "inverse")
+    (beaten,) = claims.learned_claims(in_round(CLASSICAL, worse, previewing(learned())))
+    assert (beaten.verdict, views.name_of(beaten.rival)) == (claims.BETTER, "inverse")
     # lower than ten seeds in most episodes, and higher in the mean than the controller without
     erratic = previewing(fakes.row("ahead", 1.1e-3, audit=1.1e-3, **costs))
     for episode in erratic["episodes"]:
         episode["scores"]["rms_error"] = 0.1e-3 if episode["scenario"] == "sines" else 3e-3
-    (even,) = claims.learned_claims(in_round(PAPER, erratic, previewing(learned())))
+    (even,) = claims.learned_claims(in_round(CLASSICAL, erratic, previewing(learned())))
     reason = "P 0.50 against ahead, which uses preview as well"
     assert (even.verdict, even.reasons) == (claims.NOT_SHOWN, (reason,))
 
 
-def test_learned_row_without_preview_may_beat_a_paper_controller_with_preview():
-    paper = previewing(fakes.row("ahead", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5))
-    (found,) = claims.learned_claims(in_round(paper, learned()))
+def test_learned_row_without_preview_may_beat_a_classical_controller_with_preview():
+    rival = previewing(fakes.row("ahead", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5))
+    (found,) = claims.learned_claims(in_round(rival, learned()))
     assert found.verdict == claims.BETTER
 
 
@@ -236,21 +236,21 @@ def test_negligible_constraint_cost_counts_as_none():
     assert ratio(0.1) == pytest.approx(100.0)
 
 
-def test_best_paper_controller_is_classical_with_source():
+def test_best_classical_controller_has_a_source():
     rows = [
         fakes.row("trivial", 0.1e-3, citation=""),
         learned(),
         fakes.row("pid", 2e-3),
         fakes.row("inverse", 1e-3),
     ]
-    found = claims.best_paper(rows)
+    found = claims.best_classical(rows)
     assert views.name_of(found) == "inverse"
-    assert claims.best_paper(rows[:2]) is None
+    assert claims.best_classical(rows[:2]) is None
     assert claims.learned_claims(rows[:2]) == []
 
 
 def test_claims_are_ordered_by_verdict_audit_and_probability():
     worse, outside = learned(TEN * 3), learned(audit=None)
     worse["controller"]["name"], outside["controller"]["name"] = "sac", "td3"
-    found = claims.learned_claims(in_round(worse, outside, PAPER, learned()))
+    found = claims.learned_claims(in_round(worse, outside, CLASSICAL, learned()))
     assert [views.name_of(entry.row) for entry in found] == ["ppo", "sac", "td3"]

@@ -14,6 +14,8 @@ from benchmarks.__main__ import main
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, format, leaderboard, plots, standings, summary
 from benchmarks.board.format import duration, number, table
+from benchmarks.bounds import run as bounding
+from benchmarks.bounds.run import Bound, Bounds
 from benchmarks.identity import audit
 from benchmarks.runs import rows
 from benchmarks.scoring.group import Column
@@ -53,52 +55,70 @@ def test_files_do_not_depend_on_order_and_machine(files):
     assert made.keys() == files.keys()
 
 
-def test_summary_shows_winner_and_verdict_of_each_nominal_track(files):
-    nominal = section(files[BOARD], "Nominal tracks")
-    (line,) = re.findall(r"^\| `Muscle.*$", nominal, re.MULTILINE)
-    cells = [cell.strip() for cell in line.strip("|").split("|")]
-    assert cells[1:3] == ["`inverse`<br>`ppo`", "1.00 mm<br>0.500 mm"]
-    assert cells[3:] == ["+50 %", "1.00", "**better**"]
-    (detail,) = re.findall(r"^- `MusclePositioning`, audit episodes: .*$", nominal, re.MULTILINE)
-    assert "`ppo` 0.500 [" in detail
-    assert "; lower by +50 % [+46, +54]; P(improvement) 1.00 [1.00, 1.00]; largest" in detail
-    assert detail.endswith("; better (settings tried: 40, paper's 0)")
-
-
-def nominal_tables(files: dict[str, str]) -> dict[str, tuple[list[str], list[str]]]:
-    """Return heading and cells of each environment's line among the nominal tracks."""
-    found: dict[str, tuple[list[str], list[str]]] = {}
-    heading: list[str] = []
-    for line in section(files[BOARD], "Nominal tracks").splitlines():
-        cells = [cell.strip() for cell in line.strip("|").split(" | ")]
-        if cells[0] == "environment":
-            heading = cells
-        elif line.startswith("| `"):
-            found[cells[0].strip("`")] = heading, cells
+def best_cells(texts: dict[str, str]) -> dict[str, list[list[str]]]:
+    """Return the cells of the first table, each in its lines, by environment and kind of track."""
+    found = {}
+    for line in section(texts[BOARD], "Best controllers").splitlines():
+        first, *cells = [cell.strip().split("<br>") for cell in line.strip("|").split(" | ")]
+        if first[0].startswith("`"):
+            found[" ".join(first).replace("`", "")] = cells
     return found
+
+
+def test_first_table_shows_paper_classical_learned_and_oracle(files):
+    paper, classical, learned, oracle = best_cells(files)["MusclePositioning nominal"]
+    assert paper[0] == classical[0] == "`inverse`" and learned[0] == "`ppo`"
+    assert learned[1].startswith("0.500 [") and learned[1].endswith("] mm")
+    assert oracle == ["-"]
+
+
+def test_claim_of_each_track_is_a_line_with_its_reasons(files):
+    (detail,) = re.findall(r"^- short_nominal: .*$", files[BOARD], re.MULTILINE)
+    assert "`ppo` 0.500 [" in detail and "against `inverse` 1.00 [" in detail
+    assert "; lower by +50 % [+46, +54]; P(improvement) 1.00 [1.00, 1.00]; largest" in detail
+    assert detail.endswith("; better (settings tried: 40, 0 for inverse)")
+
+
+def test_oracle_of_the_same_task_is_in_the_first_table():
+    made = standings.tracks(fakes.board())["short_nominal"]
+    episodes = (
+        Bound("a", 1, False, {"rms_error": 1e-4}),
+        Bound("b", 1, False, {"rms_error": 3e-4}),
+    )
+    bounds = Bounds(made[0]["task"], 5, episodes)
+    for task, words, short in ((bounds.task, "0.200 mm", "0.200 / -"), ("0" * 64, "-", "-")):
+        given = {"short_nominal": replace(bounds, task=task)}
+        assert f" | {words} |" in summary.board_text(made, {}, given)
+        assert f" | {short} |" in summary.excerpt([*made, *drawn(made)], given)
+
+
+def drawn(made: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the rows as those of the track with drawn plants."""
+    return [{**r, "scenarios": {**r["scenarios"], "name": "short_randomised"}} for r in made]
 
 
 def test_declared_headline_is_beside_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
     made = leaderboard.files(fakes.board() + fakes.gait())
-    found = nominal_tables(made)
-    assert found["MusclePositioning"][0][2:4] == ["RMS", "lower by"]
-    heading, cells = found["KneeWalk"]
-    assert heading[2:5] == ["RMS", "EMG effort", "lower by"]
-    assert cells[1:4] == ["`pid`<br>`ppo`", "2.00 mm<br>1.50 mm", "0.960<br>0.920"]
-    assert re.search(r"`pid` 2\.00 \[.*?\] mm, EMG effort 0\.960 \[0\.9\d+, 0", made[BOARD])
+    (_, classical, learned, _) = best_cells(made)["KneeWalk nominal"]
+    assert classical[:2] == ["`pid`", next(x for x in classical if x.startswith("2.00 ["))]
+    assert classical[2].startswith("EMG effort 0.960 [0.9")
+    assert learned[2].startswith("EMG effort 0.920 [")
 
     def change(name: str, headline: tuple[Column, ...]) -> None:
         monkeypatch.setitem(GROUPS, name, replace(GROUPS[name], headline=headline))
 
     change("gait", ())
-    assert nominal_tables(leaderboard.files(fakes.gait()))["KneeWalk"][0][2:4] == [
-        "RMS",
-        "lower by",
-    ]
+    assert len(best_cells(leaderboard.files(fakes.gait()))["KneeWalk nominal"][1]) == 2
     change("range", (("air_use", "air [mg/s]", 1e6),))
-    heading, cells = nominal_tables(leaderboard.files(fakes.gait()))["KneeWalk"]
-    assert heading[2:5] == ["RMS", "air [mg/s]", "lower by"]
-    assert cells[3] == "30.0<br>30.0"
+    classical = best_cells(leaderboard.files(fakes.gait()))["KneeWalk nominal"][1]
+    assert classical[2].startswith("air [mg/s] 30.0")
+
+
+def test_excerpt_of_readme_is_that_of_the_rows():
+    text = leaderboard.README.read_text(encoding="utf-8")
+    made = leaderboard.with_excerpt(text, leaderboard.load(rows.RESULTS), bounding.read())
+    assert made == text
+    assert text.count("| `KneeWalk` | N |") == 1
 
 
 def test_first_ranking_table_has_error_and_declared_headline() -> None:
@@ -288,7 +308,7 @@ def test_rows_of_a_track_without_audit_are_self_reported():
     text = page(fakes.row("pid", 1e-3), fakes.row("zero", 2e-3))
     assert "Self-reported: no audit round yet" in text
     board = summary.board_text([fakes.row("pid", 1e-3), fakes.row("zero", 2e-3)])
-    assert "no learned controller has been run" in board
+    assert "No learned controller has been run in `MusclePositioning`." in board
 
 
 def test_figure_is_deterministic():

@@ -91,7 +91,7 @@ def test_page_is_valid_and_loads_only_local_files(seen):
 @needs_browser
 def test_verdicts_and_rank_changes_are_shown(seen):
     assert "inverse" in seen["winners"]
-    assert seen["winners"].endswith("better (settings tried: 40, paper's 0)")
+    assert seen["winners"].endswith("better (settings tried: 40, 0 for inverse)")
     assert "inverse 2 → 3" in seen["changes"]
     assert seen["places"] == 4
 
@@ -134,7 +134,7 @@ def test_filters_keep_matching_rows(seen):
 def test_click_opens_trajectories_loop_and_commands(seen):
     assert "row=short_nominal--pid" in seen["address"]
     assert seen["charts"] == 4
-    # two errors, two loops, one pressure; reference, output, and the paper controller's output
+    # two errors, two loops, one pressure; reference, output, and the best classical one's output
     assert len(seen["lines"]) == 8
     assert all(line.count("L") > 200 and "NaN" not in line for line in seen["lines"])
     assert "the plant's loop" in seen["words"]
@@ -215,7 +215,7 @@ def test_declared_headline_has_columns_with_intervals() -> None:
         assert value == pytest.approx({"pid": 0.96, "ppo": 0.92}[row["controller"]])
         assert low < value < high
     winner = next(entry for entry in made["winners"] if entry["track"] == "walk_nominal")
-    assert list(winner["paper_scores"]) == list(winner["learned_scores"]) == ["RMS", "EMG effort"]
+    assert list(winner["rival_scores"]) == list(winner["learned_scores"]) == ["RMS", "EMG effort"]
     assert winner["learned_scores"]["EMG effort"].startswith("0.920 [0.9")
 
 

@@ -71,7 +71,7 @@ def test_controllers_with_the_plant_of_each_episode_are_listed_apart():
     found = standings.listing([nominal, informed])
     assert [views.name_of(row) for row in found.ranked] == ["a"]
     assert [views.name_of(row) for row in found.informed] == ["b"]
-    best = claims.best_paper([nominal, informed])
+    best = claims.best_classical([nominal, informed])
     assert best is not None and views.name_of(best) == "a"
 
 
