@@ -182,6 +182,41 @@ def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
     return 0
 
 
+def film(
+    track: Positional[str],
+    scenario: str = "",
+    seed: int | None = None,
+    out: Path = Path("film.mp4"),
+    oracle: bool = True,
+    results: Path = rows.RESULTS,
+) -> int:
+    """Film the best controllers of a track side by side: published, classical, learned, oracle.
+
+    Args:
+        track: Name of a track.
+        scenario: Name of one of its scenarios. Default: the first.
+        seed: Seed of the episode. Default: the first public one.
+        out: File to write, .mp4 or .gif.
+        oracle: Run the oracle too, which takes a minute or more.
+        results: Folder of the rows.
+    """
+    from benchmarks.board import film as films
+    from benchmarks.board import leaderboard, standings, summary
+
+    (chosen,) = _tracks("", (track,))
+    known = {one.name: one for one in chosen.scenarios()}
+    if scenario and scenario not in known:
+        raise ValueError(f"scenario = {scenario!r} is none of {track}: {', '.join(known)}")
+    one = known[scenario or next(iter(known))]
+    held = standings.tracks(leaderboard.load(results)).get(track, [])
+    if not held:
+        raise ValueError(f"{track} has no rows in {results}; run `python -m benchmarks run` first")
+    best = summary.best_of(track, held, {})
+    first = chosen.seeds[one.name][0]
+    print(films.write(out, chosen, best, one, first if seed is None else seed, oracle))
+    return 0
+
+
 def verify(
     row: Positional[tuple[str, ...]] = (),
     all: bool = False,
@@ -656,6 +691,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "board": board,
     "gap": gap,
     "site": site,
+    "film": film,
     "verify": verify,
     "void": void,
     "audit": audit,
