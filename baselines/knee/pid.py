@@ -28,7 +28,7 @@ from baselines.knee.published import printed_plant
 from baselines.linear.pid import DELAY_PERIODS, PI_KNOBS, Gains, Pid, PidView, simc_rule
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
-KNOBS: Bounds = {"gain": (0.1, 10.0), "integral_time": PI_KNOBS["integral_time"]}
+KNOBS: Bounds = {"gain": (0.25, 4.0), "integral_time": PI_KNOBS["integral_time"]}
 """Factors on ``K_c`` and ``tau_I``."""
 
 
