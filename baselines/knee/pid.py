@@ -28,7 +28,7 @@ from baselines.knee.published import printed_plant
 from baselines.linear.pid import DELAY_PERIODS, Gains, Pid, PidView, simc_rule
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
-KNOBS: Bounds = {"gain": (0.25, 16.0), "integral_time": (0.25, 16.0)}
+KNOBS: Bounds = {"gain": (0.25, 6.0), "integral_time": (0.25, 16.0)}
 """Factors on ``K_c`` and ``tau_I``."""
 
 
