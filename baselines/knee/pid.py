@@ -4,7 +4,8 @@ Tuning: :mod:`baselines.linear.pid` for a lag with dead time and ``tau_c = theta
 steepest static tension per pressure of the nominal orthosis. For a regulator with lag, tau_1 is its
 time constant and theta its dead time and one and a half control periods. For the published
 dynamics, whose 0.3 s are distributed over seven poles, the half rule assigns half of their sum to
-each of the two.
+each of the two. The knobs scale ``K_c`` itself, in place of ``tau_c``: with the dead time in the
+rule's denominator no ``tau_c`` doubles ``K_c``, and searches ended on that bound.
 
 The reference tension is tracked in stance and in swing; there is no second controller. The setpoint
 changes no faster than the pressure can, so that the rate limit saturates the command and not the
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from baselines.core.entry import AS_DESIGNED, KNEE, Entry, Knobs, Spec
+from baselines.core.entry import AS_DESIGNED, KNEE, Bounds, Entry, Knobs, Spec
 from baselines.knee.nominal import (
     KneeNominal,
     KneeObserver,
@@ -24,8 +25,11 @@ from baselines.knee.nominal import (
     set_point_limits,
 )
 from baselines.knee.published import printed_plant
-from baselines.linear.pid import DELAY_PERIODS, PI_KNOBS, Gains, Pid, PidView, simc_rule
+from baselines.linear.pid import DELAY_PERIODS, Gains, Pid, PidView, simc_rule
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+
+KNOBS: Bounds = {"gain": (0.25, 6.0), "integral_time": (0.25, 16.0)}
+"""Factors on ``K_c`` and ``tau_I``."""
 
 
 def simc_tension(plant: KneeOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
@@ -36,7 +40,7 @@ def simc_tension(plant: KneeOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
         tau = 0.5 * _sum_of_lags()
         theta = theta + tau
     law = simc_rule(KneeNominal(plant).steepest_gain, tau, 0.0, theta, knobs=knobs)
-    return law.parallel(period)
+    return law._replace(gain=knobs.get("gain", 1.0) * law.gain).parallel(period)
 
 
 def _sum_of_lags() -> float:
@@ -74,6 +78,6 @@ ENTRIES = {
         citation="skogestad2003",
         envs=KNEE,
         plants=(KneeOrthosis,),
-        knobs=PI_KNOBS,
+        knobs=KNOBS,
     ),
 }

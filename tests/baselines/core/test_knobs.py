@@ -221,31 +221,19 @@ def test_invalid_file_of_tuned_controllers_is_refused(tmp_path, change, message)
         tuned.entries(PUBLISHED, tuned.read(file))
 
 
-ON_BOUND = {
-    "knee_inverse_ahead_ltr_tuned_tension",
-    "knee_inverse_ahead_ltr_tuned_walk",
-    "knee_inverse_ahead_tuned_stairs_down",
-    "knee_inverse_ahead_tuned_stairs_up",
-    "knee_pid_tuned_stairs_up",
-    "knee_pid_tuned_stiffness",
-    "pid_tuned",
-}
-"""Found in a narrower search space than that of the catalogue; to be searched again."""
-REPEAT = pytest.mark.xfail(reason="an optimum is on a bound of its search", strict=True)
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[REPEAT] if n in ON_BOUND else []) for n in tuned.read()]
-)
+@pytest.mark.parametrize("name", tuned.read())
 def test_optimum_is_inside_its_search_space(name):
     assert tuned.read()[name].on_bounds == ()
 
 
-@pytest.mark.parametrize("name", sorted(ON_BOUND))
-def test_search_space_has_been_widened_beyond_an_optimum_on_its_bound(name):
-    found = tuned.read()[name]
-    known = PUBLISHED[found.controller].knobs
-    assert dataclasses.replace(found, bounds=known).on_bounds == ()
+def test_knob_of_the_knees_pi_is_its_gain():
+    env = make_env("PAM/KneeWalk-v0")
+    plain, double = built("knee_pid", env), built("knee_pid", env, gain=2.0)
+    slow = built("knee_pid", env, integral_time=2.0)
+    assert double.gains.proportional == pytest.approx(2.0 * plain.gains.proportional)
+    assert double.gains.integral == pytest.approx(2.0 * plain.gains.integral)
+    assert slow.gains.integral == pytest.approx(0.5 * plain.gains.integral)
+    assert slow.gains.proportional == pytest.approx(plain.gains.proportional)
 
 
 def test_optimum_on_either_bound_is_noticed():
