@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
-from pam_envs.hysteresis.protocol import HysteresisModel
+from pam_envs.hysteresis.protocol import HysteresisModel, Rows, RowsState
 from pam_envs.hysteresis.slip import SlipModel, flat_rows, slip_lag, slip_to
 from pam_envs.kernels.build import entry, kernel
 from pam_envs.muscle.effective_area import (
@@ -146,6 +146,21 @@ def felt_rows(
 
 
 @entry
+def slide_rows(
+    pressure: Array, pull: float, law: Array, friction: float, free: float, grows: float,
+    thresholds: Array, curves: Array, low: float, per: float, sliders: Array,
+) -> None:  # fmt: skip
+    """Move the sliders, (rows, n), through pressures [Pa], shape (n_steps, rows)."""
+    for r in range(len(sliders)):
+        for k in range(len(pressure)):
+            p, limit = pressure[k, r], limit_of(pressure[k, r], free, grows)
+            strain = strain_of_rest(
+                p, pull, 1.0, law, friction, limit, thresholds, curves, low, per, sliders[r]
+            )
+            slip_to(strain, limit, thresholds, sliders[r], sliders[r])
+
+
+@entry
 def needed_rows(
     drive: Array, pull: float, law: Array, friction: float, free: float, grows: float,
     thresholds: Array, curves: Array, low: float, per: float, before: Array, pressure: Array,
@@ -229,12 +244,12 @@ class LoadedFriction(HysteresisModel):
         return model
 
     @cached_property
-    def _numbers(self) -> tuple[Any, ...]:
+    def _numbers(self) -> tuple[float, Array, float, float, float, Array, Array, float, float]:
         """Arguments of the loops over rows between the inputs and the sliders."""
         held, law = self.plant.hysteresis, law_numbers(self.plant.muscle)
         free = 1.0 + held.limit_per_load * self.load
-        grown = (held.friction, free, held.limit_per_pressure)
-        return (self.load * GRAVITY, law, *grown, *self._model.arrays)
+        slips = (held.friction, free, held.limit_per_pressure)
+        return (self.load * GRAVITY, law, *slips, *self._model.arrays)
 
     def _by_row(self, solve: Any, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
         """Return the outputs of a loop over rows, and the states after it."""
@@ -255,3 +270,23 @@ class LoadedFriction(HysteresisModel):
     def inverse_step(self, y: ArrayLike, state: Any) -> tuple[Array, Array]:
         """Return the pressures that give effective pressures, and the state after."""
         return self._by_row(needed_rows, y, state)
+
+    def along(self, x: ArrayLike, state: ArrayLike) -> Array:
+        """Return the state, (n_rows, n), after pressures in turn, shape (n_steps, n_rows)."""
+        after = np.array(state, float, order="C")
+        slide_rows(np.array(x, float, order="C"), *self._numbers, after)
+        return after
+
+    def rows(self) -> FrictionRows:
+        """Return the friction over rows of environments."""
+        return FrictionRows(self)
+
+
+class FrictionRows(Rows):
+    """Friction over rows of environments."""
+
+    operator: LoadedFriction
+
+    def along(self, x: Array, state: RowsState) -> RowsState:
+        """Return the states after inputs in turn, in one loop."""
+        return (self.operator.along(x, state[0]),)
