@@ -77,7 +77,7 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
         observations.append(observation)
         actions.append(action)
         seconds.append(spent)
-        said = info.copy()  # a plain dict
+        said = dict(info.items())  # reads faster
         infos.append(tuple([said[key] for key in keys]))
         models.append(followed)
         observation, over = after, terminated or truncated
