@@ -160,6 +160,25 @@ def slide_rows(
             slip_to(strain, limit, thresholds, sliders[r], sliders[r])
 
 
+@kernel
+def pressure_needed(
+    drive: float, strain: float, law: Any, friction: float, free: float, grows: float,
+    thresholds: Any, curves: Any, low: float, per: float, sliders: Any,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the pressure [Pa] that gives an effective one at a strain, and its limit of friction.
+
+    ``free`` and ``grows`` are those of :func:`limit_of`.
+    """
+    area, p, limit = area_of(strain, law), drive, 1.0
+    for _ in range(REPEATS):
+        was, limit = p, limit_of(p, free, grows)
+        lag, _ = slip_lag(strain, limit, thresholds, curves, low, per, sliders)
+        p = drive + friction * lag / area
+        if abs(p - was) < SETTLED:
+            break
+    return p, limit
+
+
 @entry
 def needed_rows(
     drive: Array, pull: float, law: Array, friction: float, free: float, grows: float,
@@ -171,14 +190,9 @@ def needed_rows(
         strain = strain_of_rest(
             drive[r], pull, 1.0, law, 0.0, 1.0, thresholds[:0], curves, low, per, before[r]
         )
-        area, p, limit = area_of(strain, law), drive[r], 1.0
-        for _ in range(REPEATS):
-            was, limit = p, limit_of(p, free, grows)
-            lag, _ = slip_lag(strain, limit, thresholds, curves, low, per, before[r])
-            p = drive[r] + friction * lag / area
-            if abs(p - was) < SETTLED:
-                break
-        pressure[r] = p
+        pressure[r], limit = pressure_needed(
+            drive[r], strain, law, friction, free, grows, thresholds, curves, low, per, before[r]
+        )
         slip_to(strain, limit, thresholds, before[r], after[r])
 
 
