@@ -203,8 +203,7 @@ def targets(
     sliders, weight = state[SLIDERS : SLIDERS + len(thresholds)], load * GRAVITY
     for a in range(len(aims)):
         strain = work[0][a] / data[REST_LENGTH] + state[REST]
-        work[1][a] = drive_of(weight, strain, law)
-        pressure = work[1][a]
+        pressure = drive_of(weight, strain, law)
         if len(thresholds) > 0:
             resting = free_rest(pressure, weight, data, law, thresholds, curves, sliders)
             free = 1.0 + data[PER_LOAD] * load

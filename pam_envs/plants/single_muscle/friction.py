@@ -165,7 +165,7 @@ def pressure_needed(
     drive: float, strain: float, law: Any, friction: float, free: float, grows: float,
     thresholds: Any, curves: Any, low: float, per: float, sliders: Any,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the pressure [Pa] that gives an effective one at a strain, and its limit of friction.
+    """Return the pressure [Pa] that gives an effective one at a strain, and the limit there.
 
     ``free`` and ``grows`` are those of :func:`limit_of`.
     """
