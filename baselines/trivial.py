@@ -34,8 +34,9 @@ class Constant(RowController):
 
 
 class RandomState(NamedTuple):
-    """Index of the next draw of each row, shape (n_env,)."""
+    """Digest of the first observation, and index of the next draw, shapes (n_env,)."""
 
+    episode: NDArray[np.uint64]
     draw: NDArray[np.uint64]
 
 
@@ -43,37 +44,45 @@ class RandomState(NamedTuple):
 class Random(RowController):
     """Uniformly distributed actions, drawn in each control period.
 
-    Draw ``k`` of row ``i`` is a function of seed, signal, ``i`` and ``k`` alone: the same calls
-    give the same actions, and row ``i`` of a batch does not depend on the others.
+    A draw is a function of seed, signal, number and the first observation of its episode alone,
+    without previewed samples: the same episodes get the same actions, and a row of a batch is the
+    single episode. ``columns`` are those of the observation that count.
     """
 
     write: Writer
     signals: Sequence[Signal]
+    columns: NDArray[np.int64]
     seed: int
 
     def initial_state(self, observation: ArrayLike) -> RandomState:
         """Return the state before the first draw."""
-        return RandomState(np.zeros(row_count(observation), np.uint64))
+        seen = np.asarray(observation, np.float32)[..., self.columns].reshape(-1, len(self.columns))
+        episode = np.zeros(len(seen), np.uint64)
+        for bits in np.ascontiguousarray(seen.T).view(np.uint32):
+            episode = _mixed(episode, bits)
+        return RandomState(episode, np.zeros_like(episode))
 
     def respond(self, observation: ArrayLike, state: RandomState) -> Prediction:
         """Return the action of the next draw, and the state after it."""
-        row, values = np.arange(len(state.draw), dtype=np.uint64), []
+        values = []
         for k, signal in enumerate(self.signals):
             seed = np.uint64((self.seed * len(self.signals) + k) % 2**32)
-            share = _uniform(seed, row, state.draw)
+            bits = _mixed(_mixed(state.episode, seed), state.draw)
+            share = (bits >> np.uint64(11)) * 2.0**-53
             values.append(signal.low + (signal.high - signal.low) * share)
-        return self.write(np.array(values), observation), RandomState(state.draw + np.uint64(1))
+        after = state._replace(draw=state.draw + np.uint64(1))
+        return self.write(np.array(values), observation), after
 
 
-def _uniform(seed: np.uint64, row: NDArray[np.uint64], draw: NDArray[np.uint64]) -> Array:
-    """Return numbers in [0, 1): finaliser of SplitMix64 on a counter (steele2014)."""
+def _mixed(
+    start: NDArray[np.uint64], number: NDArray[np.unsignedinteger[Any]] | np.uint64
+) -> NDArray[np.uint64]:
+    """Return a digest of two numbers: draw ``number`` of SplitMix64 from a start (steele2014)."""
     with np.errstate(over="ignore"):
-        z = (seed << np.uint64(32)) + (row << np.uint64(20)) + draw + np.uint64(1)
-        z = z * np.uint64(0x9E3779B97F4A7C15)
+        z = start + (number + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
         z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
         z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-        z = z ^ (z >> np.uint64(31))
-    return np.asarray((z >> np.uint64(11)) * 2.0**-53)
+        return np.asarray(z ^ (z >> np.uint64(31)))
 
 
 def _signals(spec: Spec[Any], joints: bool) -> tuple[Writer, tuple[Signal, ...]]:
@@ -92,7 +101,8 @@ def make_constant(spec: Spec[Any], value: float = -math.inf, joints: bool = Fals
 
 def make_random(spec: Spec[Any], joints: bool = False) -> Random:
     """Return the controller that draws all signals, or the setpoints of joints."""
-    return Random(*_signals(spec, joints), spec.seed)
+    columns = [signal.index for signal in spec.signals if signal.ahead == 0.0]
+    return Random(*_signals(spec, joints), np.array(columns), spec.seed)
 
 
 TRIVIAL = partial(Entry, knowledge="nothing")

@@ -15,7 +15,6 @@ def check_controller(
     controller: Controller,
     observations: ArrayLike,
     action_signals: Signals,
-    independent_of_row: bool = True,
 ) -> None:
     """Raise unless a controller satisfies the contract of a policy predictor.
 
@@ -26,9 +25,6 @@ def check_controller(
         As returned by an environment; at least four steps and two rows that differ.
     action_signals : Signals
         Those of the environment.
-    independent_of_row : bool
-        Whether a single row gets the same actions as in a batch; False for controllers whose random
-        numbers depend on the row.
 
     Raises
     ------
@@ -39,8 +35,7 @@ def check_controller(
     """
     seen = np.asarray(observations)
     _check_form(controller, seen, action_signals)
-    if independent_of_row:
-        _check_rows(controller, seen)
+    _check_rows(controller, seen)
     _check_reset(controller, seen)
 
 

@@ -33,13 +33,12 @@ from baselines.positioning.inverse import Inverse, InversePid
 from baselines.positioning.nominal import CURVE_POINTS
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.elements import play
-from pam_envs.hysteresis.slip import SlipModel, slip_lag
+from pam_envs.hysteresis.slip import SlipModel
 from pam_envs.kernels.arithmetic import clip, decay, round_to_integer
 from pam_envs.kernels.build import array_at, kernel
 from pam_envs.plants.single_muscle.friction import (
-    CLOSE,
-    REPEATS,
     law_numbers,
+    pressure_needed,
     strain_of_rest,
 )
 
@@ -204,24 +203,15 @@ def targets(
     sliders, weight = state[SLIDERS : SLIDERS + len(thresholds)], load * GRAVITY
     for a in range(len(aims)):
         strain = work[0][a] / data[REST_LENGTH] + state[REST]
-        work[1][a] = drive_of(weight, strain, law)
-        work[2][a] = free_rest(work[1][a], weight, data, law, thresholds, curves, sliders)
-        work[0][a] = work[1][a]
-    if len(thresholds) > 0:
-        for _ in range(REPEATS):
-            largest = 0.0
-            for a in range(len(aims)):
-                limit = limit_at(work[0][a], load, data)
-                lag, _ = slip_lag(
-                    work[2][a], limit, thresholds, curves, data[LOW], data[PER], sliders
-                )
-                moved = work[1][a] + data[FRICTION] * lag / area_at(work[2][a], law)
-                largest = max(largest, abs(moved - work[0][a]))
-                work[0][a] = moved
-            if largest < CLOSE:
-                break
-    for a in range(len(aims)):
-        work[0][a] = min(max(work[0][a], 0.0), data[FULL])
+        pressure = drive_of(weight, strain, law)
+        if len(thresholds) > 0:
+            resting = free_rest(pressure, weight, data, law, thresholds, curves, sliders)
+            free = 1.0 + data[PER_LOAD] * load
+            pressure, _ = pressure_needed(
+                pressure, resting, law, data[FRICTION], free, data[PER_PRESSURE], thresholds,
+                curves, data[LOW], data[PER], sliders,
+            )  # fmt: skip
+        work[0][a] = min(max(pressure, 0.0), data[FULL])
 
 
 @kernel

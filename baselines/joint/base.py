@@ -183,11 +183,22 @@ class Gravity:
 
     @cached_property
     def _table(self) -> Array:
-        """Shifts [rad] by angle and torque."""
-        low, high = self.plant.angle_range
-        angle = np.linspace(low, high, ANGLES)[:, None]
-        torque = np.linspace(-LARGEST_TORQUE, LARGEST_TORQUE, TORQUES)[None, :]
-        return self.plant.shift_for(angle, self.plant.prestress, torque, high)
+        """Shifts by angle and torque, kept by plant."""
+        key = self.plant.digest()
+        if key not in _TABLES:
+            _TABLES[key] = _table_of(self.plant)
+        return _TABLES[key]
+
+
+_TABLES: dict[str, Array] = {}
+
+
+def _table_of(plant: Any) -> Array:
+    """Return the shifts [rad] by angle and torque, shape (ANGLES, TORQUES)."""
+    low, high = plant.angle_range
+    angle = np.linspace(low, high, ANGLES)[:, None]
+    torque = np.linspace(-LARGEST_TORQUE, LARGEST_TORQUE, TORQUES)[None, :]
+    return np.asarray(plant.shift_for(angle, plant.prestress, torque, high))
 
 
 class Parts(NamedTuple):

@@ -40,10 +40,11 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from baselines.linear.bumpless import Bumpless, BumplessGains
@@ -207,9 +208,15 @@ def mean_time(pulse: Array, period: float) -> float:
 
 def phase(pulse: Array, period: float) -> Array:
     """Return the phase [rad] at ``FREQUENCIES``, without the hold, from a response's increments."""
-    time = (np.arange(len(pulse)) + 1.0) * period
-    response = np.exp(-1j * np.multiply.outer(FREQUENCIES, time)) @ pulse
+    response = _waves(len(pulse), period) @ pulse
     return np.unwrap(np.angle(response)) + 0.5 * period * FREQUENCIES
+
+
+@cache
+def _waves(count: int, period: float) -> NDArray[np.complex128]:
+    """Return the Fourier factors of increments at ``FREQUENCIES``, shape (400, count)."""
+    time = (np.arange(count) + 1.0) * period
+    return np.asarray(np.exp(-1j * np.multiply.outer(FREQUENCIES, time)))
 
 
 DAMPING = 1.0 / math.sqrt(2.0)

@@ -152,9 +152,7 @@ class KneeAnticipation(RowController):
         """
         view, signal = self.observer.read(observation), self.action_signal
         arrival = self.bank.arrival(now.bank)
-        later = now.hysteresis
-        for pressure in arrival.pressures:
-            later = self.observer.nominal.advance(pressure, later)
+        later = self.observer.nominal.along(arrival.pressures, now.hysteresis)
         ends = arrival.delay[:, None] + ENDS
         stiffness, weight = self._demands(view, now, ends, more)
         stiffness = stiffness * (now.moments[:, 0] / now.moments[:, 1])[:, None]

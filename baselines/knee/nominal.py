@@ -82,6 +82,10 @@ class KneeNominal:
         """Return the hysteresis state after a pressure [Pa]."""
         return self.hysteresis.forward(pressure, state)[1]
 
+    def along(self, pressures: Array, state: RowsState) -> RowsState:
+        """Return the state after pressures [Pa] one after the other, shape (n_steps, n_env)."""
+        return self.hysteresis.along(pressures, state)
+
     def stiffness_after(self, pressure: Array, state: RowsState) -> Array:
         """Return the stiffness [N/m] at a pressure [Pa] that the history ends with."""
         return self.per_output * self.hysteresis.forward(pressure, state)[0]

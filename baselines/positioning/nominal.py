@@ -65,6 +65,11 @@ class LoadedMuscle:
         output, after = self.hysteresis.forward(law.stretched(drive, full), state)
         return law.unstretched(output, full), after
 
+    def along(self, drives: Array, state: RowsState) -> RowsState:
+        """Return the state after pressures [Pa] one after the other, shape (n_env, n_steps)."""
+        law, full = self.plant.hysteresis, self.plant.regulator.max_pressure
+        return self.hysteresis.along(law.stretched(drives, full).T, state)  # type: ignore[no-any-return]
+
     def pressure_for(self, drive: Array, state: RowsState) -> Array:
         """Return the pressure [Pa] for an effective pressure [Pa] at this hysteresis state."""
         law, full = self.plant.hysteresis, self.plant.regulator.max_pressure

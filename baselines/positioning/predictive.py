@@ -88,7 +88,8 @@ class PredictiveInverse(RowController):
         """Return the state that explains the first measurement."""
         contraction, _, set_point, load = self.reader.rows(observation)
         hysteresis = self.nominal.each(load, LoadedMuscle.explain, contraction, set_point)
-        expected = self._contraction(set_point, hysteresis, load)
+        felt, _ = self.nominal.each(load, LoadedMuscle.advance, set_point, hysteresis)
+        expected = self._contraction(felt, load)
         return PredictiveState(
             self.bank.start(set_point),
             hysteresis,
@@ -108,9 +109,8 @@ class PredictiveInverse(RowController):
         """Return the setpoints [Pa], shape (n_env,), after :meth:`observed`."""
         load, signal = self.reader.rows(observation)[3], self.action_signal
         arrival = self.bank.arrival(now.bank)
-        later = now.hysteresis
-        for pressure in arrival.pressures:
-            later = self.nominal.each(load, LoadedMuscle.advance, pressure, later)[1]
+        coming = arrival.pressures.T
+        later = self.nominal.each(load, LoadedMuscle.along, coming, now.hysteresis)
         ends = now.seen.step[:, None] + arrival.delay[:, None] + self._lag + ENDS
         samples, known = self.memory.read(now.seen, ends)
         goals = samples[:, 0] - now.disturbance[:, None]
@@ -129,8 +129,8 @@ class PredictiveInverse(RowController):
         if observes:
             bank = self.bank.observe(bank, pressure)
         held = self.bank.now(bank)
-        hysteresis = self.nominal.each(load, LoadedMuscle.advance, held, state.hysteresis)[1]
-        rest, expected = self._contraction(held, hysteresis, load), state.expected
+        felt, hysteresis = self.nominal.each(load, LoadedMuscle.advance, held, state.hysteresis)
+        rest, expected = self._contraction(felt, load), state.expected
         expected = expected - math.expm1(-1.0 / self._lag) * (rest - expected)
         if observes:
             share = -math.expm1(-self.bank.period / self.observer)
@@ -138,14 +138,9 @@ class PredictiveInverse(RowController):
         seen = self.memory.add(state.seen, self.references.rows(observation).T[:, None])
         return PredictiveState(bank, hysteresis, seen, expected, disturbance)
 
-    def _contraction(self, pressure: Array, hysteresis: RowsState, load: Array) -> Array:
-        """Return the nominal contraction at rest [m], shape (n_env,)."""
-        return np.asarray(self.nominal.each(load, resting, pressure, hysteresis))
-
-
-def resting(muscle: LoadedMuscle, pressure: Array, hysteresis: RowsState) -> Array:
-    """Return the contraction at rest [m] at a pressure [Pa] that the history ends with."""
-    return muscle.contraction_at(muscle.advance(pressure, hysteresis)[0])
+    def _contraction(self, felt: Array, load: Array) -> Array:
+        """Return the nominal contraction at rest [m] under effective pressures [Pa], (n_env,)."""
+        return np.asarray(self.nominal.each(load, LoadedMuscle.contraction_at, felt))
 
 
 def pressures(muscle: LoadedMuscle, goals: Array, hysteresis: RowsState) -> Array:

@@ -8,7 +8,7 @@ a constant reference is reached without offset if the model is exact. The termin
 the infinite horizon with the last reference held (Riccati equation, python-control): without limits
 the first input is that of the linear-quadratic regulator, for every horizon.
 
-Limits of the input are kept by projected gradient steps (FISTA, beck2009), all rows at once.
+Limits of the input are kept by projected gradient steps (FISTA, beck2009), each row by itself.
 """
 
 import math
@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from pam_envs.arrays import Array
+from pam_envs.kernels.build import entry
 
 STEPS = 60
 """Projected gradient steps; none are needed where no limit is active."""
@@ -72,19 +73,47 @@ class LinearPredictor:
         """
         force = _product(self.by_state, state) + _product(self.by_last, last[:, None])
         force = force - _product(self.by_reference, reference)
-        ends = [np.broadcast_to(np.asarray(end, float), last.shape)[:, None] for end in (low, high)]
-        free = -_product(self._solution, force)
-        best = np.clip(free, *ends)
-        limited = np.any(best != free, axis=1)
-        if not limited.any():
-            return np.asarray(free)
-        ahead, share = best, 1.0
+        lowest, highest = np.empty((2, len(last)))
+        lowest[:], highest[:] = low, high
+        found = -_product(self._solution, force)
+        least, most = found.min(axis=1), found.max(axis=1)
+        limited = np.flatnonzero((least < lowest) | (most > highest))
+        if len(limited):
+            inputs, work = found[limited], np.empty((3, found.shape[1]))
+            ends = (lowest[limited], highest[limited])
+            improve_rows(self.curve, force[limited], self._rate, *ends, inputs, work)
+            found[limited] = inputs
+        return found
+
+
+@entry
+def improve_rows(
+    curve: Array, force: Array, rate: float, low: Array, high: Array, inputs: Array, work: Array
+) -> None:
+    """Lead inputs, shape (rows, N), to the best ones within limits, (rows,), in ``STEPS`` steps.
+
+    ``work`` holds the best inputs so far, those ahead of them, and the slopes of the cost.
+    """
+    best, ahead, slope, n = work[0], work[1], work[2], len(curve)
+    for r in range(len(inputs)):
+        for i in range(n):
+            best[i] = ahead[i] = min(max(inputs[r, i], low[r]), high[r])
+        share = 1.0
         for _ in range(STEPS):
-            after = np.clip(ahead - self._rate * (_product(self.curve, ahead) + force), *ends)
-            grown = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * share**2))
-            ahead = after + (share - 1.0) / grown * (after - best)
-            best, share = after, grown
-        return np.where(limited[:, None], best, free)
+            for i in range(n):
+                slope[i] = force[r, i]
+            for j in range(n):  # the curvature is symmetric
+                for i in range(n):
+                    slope[i] = slope[i] + curve[j, i] * ahead[j]
+            grown = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * share * share))
+            more = (share - 1.0) / grown
+            for i in range(n):
+                after = min(max(ahead[i] - rate * slope[i], low[r]), high[r])
+                ahead[i] = after + more * (after - best[i])
+                best[i] = after
+            share = grown
+        for i in range(n):
+            inputs[r, i] = best[i]
 
 
 def _product(matrix: Array, rows: Array) -> Array:

@@ -9,13 +9,14 @@ Times are in control periods from the start of the episode.
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baselines.core.controller import Rows
 from pam_envs.arrays import Array
+from pam_envs.kernels.build import entry
 
 
 class Preview(NamedTuple):
@@ -76,14 +77,35 @@ class PreviewMemory:
 
         The samples have the shape (n_env, n_channels, n_times).
         """
-        last = (seen.step + self.ahead[-1])[:, None]
-        strides = np.ceil(np.maximum(times - last, 0.0) / self.stride)
-        before = times - strides * self.stride if math.isfinite(self.stride) else times
-        known = (before >= 0.0) & (before <= last)
-        held = np.clip(np.where(before >= 0.0, before, last), 0.0, last)
-        whole = np.minimum(held.astype(np.int64), np.maximum(last - 1, 0))
-        part = (held - whole)[:, None]
-        rows, channels = np.arange(len(held))[:, None, None], np.arange(seen.samples.shape[1])
-        low = seen.samples[rows, channels[:, None], (whole % self.size)[:, None]]
-        high = seen.samples[rows, channels[:, None], ((whole + 1) % self.size)[:, None]]
-        return (1.0 - part) * low + part * high, known
+        n, count = times.shape
+        samples = np.ascontiguousarray(seen.samples)
+        found, known = np.empty((n, samples.shape[1], count)), np.empty((n, count), bool)
+        stride = self.stride if math.isfinite(self.stride) else 0.0
+        given = np.array(times, float, order="C")
+        read_rows(samples, seen.step + self.ahead[-1], given, stride, found, known)
+        return found, known
+
+
+@entry
+def read_rows(
+    samples: Array, last: Any, times: Array, stride: float, found: Array, known: Any
+) -> None:
+    """Write samples at times and where they are known; ``last`` is the last time in the memory.
+
+    ``stride`` is 0 without a period.
+    """
+    size = samples.shape[2]
+    for i in range(len(times)):
+        for j in range(times.shape[1]):
+            time, end = times[i, j], float(last[i])
+            if stride > 0.0 and time > end:
+                late = (time - end) / stride
+                strides = int(late)
+                time = time - (strides + (1 if strides < late else 0)) * stride
+            known[i, j] = 0.0 <= time <= end
+            held = max(0.0, min(time if time >= 0.0 else end, end))
+            whole = int(min(held, max(end - 1.0, 0.0)))
+            part = held - whole
+            for c in range(samples.shape[1]):
+                low, high = samples[i, c, whole % size], samples[i, c, (whole + 1) % size]
+                found[i, c, j] = (1.0 - part) * low + part * high

@@ -11,6 +11,7 @@ with one candidate is the nominal regulator, whose state depends on no measureme
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -18,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.arrays import Array
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import entry, kernel
 from pam_envs.parameters import declarations
 
 POINTS = {"dead_time": 9, "time_constant": 4, "slew_rate": 6}
@@ -28,15 +31,43 @@ TRUST = 25.0
 """Weight of the nominal candidate: variances of the sensor that another one has to gain."""
 
 
-def regulated(
-    pressure: Array, set_point: Array, lag: Array | float, rate: Array | float, time: Array | float
-) -> Array:
-    """Return pressures [Pa] after a time [s] under setpoints [Pa]: first-order lag, rate limit."""
+@kernel
+def regulated(pressure: float, set_point: float, lag: float, rate: float, time: float) -> float:
+    """Return the pressure [Pa] after a time [s] under a setpoint: first-order lag, rate limit."""
+    if not time > 0.0:
+        return pressure
     gap = set_point - pressure
-    size = np.abs(gap)
-    ramp = np.minimum(np.maximum(size / rate - lag, 0.0), time)
-    left = (size - rate * ramp) * np.exp((ramp - time) / lag)
-    return np.where(time > 0.0, set_point - np.copysign(left, gap), pressure)
+    ramp = min(max(abs(gap) / rate - lag, 0.0), time)
+    left = (abs(gap) - rate * ramp) * decay((time - ramp) / lag)
+    return set_point - (left if gap > 0.0 else -left)
+
+
+@entry
+def advance_rows(
+    pressure: Array, commands: Array, whole: Any, part: Array, lag: Array, rate: Array,
+    period: float, after: Array,
+) -> None:  # fmt: skip
+    """Write the pressures of all candidates one control period later, newest command first."""
+    for i in range(len(pressure)):
+        for m in range(len(lag)):
+            older, newer, share = commands[i, whole[m] + 1], commands[i, whole[m]], part[m]
+            p = regulated(pressure[i, m], older, lag[m], rate[m], share * period)
+            after[i, m] = regulated(p, newer, lag[m], rate[m], (1.0 - share) * period)
+
+
+@entry
+def arrive_rows(
+    pressure: Array, commands: Array, whole: Any, delay: Array, lag: Array, rate: Array,
+    period: float, stages: Array,
+) -> None:  # fmt: skip
+    """Write the pressures at the ends of stages until a setpoint of now takes effect."""
+    for i in range(len(pressure)):
+        p = pressure[i]
+        for k in range(len(stages)):
+            share = (1.0 if k > 0 else delay[i] - whole[i]) if k <= whole[i] else 0.0
+            command = commands[i, max(whole[i] - k, 0)]
+            p = regulated(p, command, lag[i], rate[i], share * period)
+            stages[k, i] = p
 
 
 class BankState(NamedTuple):
@@ -105,12 +136,16 @@ class RegulatorBank:
             axes.append(np.geomspace(low, high, points) if high > low else [low])
         candidates = [*nominal, *(product(*axes) if adaptive else ())]
         noise = max(plant.pressure.noise, 1.0)
-        dead_time, lag, rate = np.array(candidates, float).T
+        dead_time, lag, rate = np.array(candidates, float).T.copy()
         return cls(dead_time, lag, rate, noise, plant.control_period)
 
-    @property
+    @cached_property
     def _whole(self) -> NDArray[np.int64]:
         return np.floor(self.dead_time / self.period + 1e-9).astype(np.int64)
+
+    @cached_property
+    def _part(self) -> Array:
+        return self.dead_time / self.period - self._whole
 
     def start(self, set_point: Array) -> BankState:
         """Return the state at rest under setpoints [Pa], shape (n_env,)."""
@@ -128,15 +163,11 @@ class RegulatorBank:
 
     def advance(self, state: BankState, set_point: Array) -> BankState:
         """Return the state one control period later, under setpoints [Pa], shape (n_env,)."""
-        commands = np.hstack([set_point[:, None], state.commands[:, :-1]])
-        whole = self._whole
-        part = self.dead_time / self.period - whole
-        older, newer = commands[:, whole + 1], commands[:, whole]
-        pressure = regulated(state.pressure, older, self.lag, self.rate, part * self.period)
-        rest = (1.0 - part) * self.period
-        return BankState(
-            regulated(pressure, newer, self.lag, self.rate, rest), state.deviation, commands
-        )
+        commands = np.concatenate([set_point[:, None], state.commands[:, :-1]], axis=1)
+        pressure = np.empty_like(state.pressure, order="C")
+        before, laws = np.ascontiguousarray(state.pressure), (self.lag, self.rate, self.period)
+        advance_rows(before, commands, self._whole, self._part, *laws, pressure)
+        return BankState(pressure, state.deviation, commands)
 
     def best(self, state: BankState) -> NDArray[np.int64]:
         """Return the candidate in use of each row."""
@@ -148,13 +179,9 @@ class RegulatorBank:
 
     def arrival(self, state: BankState) -> Arrival:
         """Return the pressures until a setpoint of now takes effect."""
-        best, rows = self.best(state), np.arange(len(state.pressure))
+        best, commands = self.best(state), np.ascontiguousarray(state.commands)
         whole, lag, rate = self._whole[best], self.lag[best], self.rate[best]
         delay = self.dead_time[best] / self.period
-        pressure, made = self.now(state), []
-        for k in range(int(whole.max()) + 1):
-            command = state.commands[rows, np.maximum(whole - k, 0)]
-            share = np.where(k <= whole, 1.0 if k else delay - whole, 0.0)
-            pressure = regulated(pressure, command, lag, rate, share * self.period)
-            made.append(pressure)
-        return Arrival(np.array(made), delay, lag, rate)
+        stages = np.empty((int(whole.max()) + 1, len(best)))
+        arrive_rows(self.now(state), commands, whole, delay, lag, rate, self.period, stages)
+        return Arrival(stages, delay, lag, rate)

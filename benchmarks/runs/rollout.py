@@ -77,7 +77,8 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
         observations.append(observation)
         actions.append(action)
         seconds.append(spent)
-        infos.append(tuple([info[key] for key in keys]))
+        said = dict(info.items())  # reads faster
+        infos.append(tuple([said[key] for key in keys]))
         models.append(followed)
         observation, over = after, terminated or truncated
         if terminated:

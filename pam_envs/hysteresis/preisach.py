@@ -323,6 +323,13 @@ class Preisach(HysteresisModel):
         """
         return self._each(advance_rows, x, state)
 
+    def after(self, x: ArrayLike, state: PreisachState) -> PreisachState:
+        """Return the state after inputs one after the other, shape (T, *batch)."""
+        values, rows = np.array(x, float).reshape(len(np.asarray(x)), -1), self._rows(state)
+        outputs = np.empty_like(values)
+        advance_rows(values, *rows, self.everett, self.low, self.inverse_cell, outputs)
+        return _shaped(rows, np.shape(state.counts))
+
     def inverse_step(self, y: ArrayLike, state: PreisachState) -> tuple[Array, PreisachState]:
         """Return the input that takes the output to ``y``, and the state after that input.
 
@@ -382,6 +389,10 @@ class PreisachRows(Rows):
         """Return the outputs for inputs, shape (rows,), and the states they leave."""
         output, after = self.operator.step(x, _row_last(state))
         return output, _row_first(after)
+
+    def along(self, x: Array, state: RowsState) -> RowsState:
+        """Return the states after inputs one after the other, in one loop."""
+        return _row_first(self.operator.after(x, _row_last(state)))
 
     def inverse(self, y: Array, state: RowsState) -> Array:
         """Return the inputs by the recursion over the stack; the states do not change."""

@@ -285,6 +285,12 @@ class Rows:
         output, after = self.operator.step(x, state[0])
         return output, (after,)
 
+    def along(self, x: Array, state: RowsState) -> RowsState:
+        """Return the states after inputs one after the other, shape (n_steps, rows)."""
+        for one in x:
+            state = self.forward(one, state)[1]
+        return state
+
     def inverse(self, y: Array, state: RowsState) -> Array:
         """Return the inputs that give outputs, shape (rows,); the states do not change."""
         return self.operator.inverse_step(y, state[0])[0]  # type: ignore[no-any-return]

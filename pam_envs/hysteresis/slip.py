@@ -18,6 +18,7 @@ density over ``c``.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -194,6 +195,13 @@ def slip_lag(
     return lag, slope
 
 
+@kernel
+def slip_to(x: float, limit: float, thresholds: Any, before: Any, after: Any) -> None:
+    """Write the sliders' positions after motion to ``x`` from those before."""
+    for k in range(len(thresholds)):
+        after[k] = play(x, thresholds[k] * limit, before[k])
+
+
 @entry
 def slip_rows(
     x: Array, limit: Array, thresholds: Array, curves: Array, low: float, per: float,
@@ -202,8 +210,26 @@ def slip_rows(
     """Write the lags at inputs, shape (rows,), and the sliders, (rows, n), after ``before``."""
     for r in range(len(x)):
         lag[r] = slip_lag(x[r], limit[r], thresholds, curves, low, per, before[r])[0]
-        for k in range(len(thresholds)):
-            after[r][k] = play(x[r], thresholds[k] * limit[r], before[r][k])
+        slip_to(x[r], limit[r], thresholds, before[r], after[r])
+
+
+def flat_rows(
+    values: Sequence[ArrayLike], sliders: ArrayLike, elements: int
+) -> tuple[tuple[int, ...], list[Array], Array]:
+    """Return values of broadcast shape (...) and sliders, (..., elements), as rows for a loop.
+
+    The shape comes first; the arrays are contiguous copies.
+    """
+    held, given = np.asarray(sliders, float), [np.asarray(v, float) for v in values]
+    shape = np.broadcast_shapes(*(v.shape for v in given), held.shape[:-1])
+    flat = [_whole(v, shape).reshape(-1) for v in given]
+    return shape, flat, _whole(held, (*shape, elements)).reshape(math.prod(shape), elements)
+
+
+def _whole(values: Array, shape: tuple[int, ...]) -> Array:
+    """Return a contiguous copy in a shape."""
+    same = values.shape == shape  # saves time
+    return np.array(values if same else np.broadcast_to(values, shape), order="C")
 
 
 class SlipModel(HysteresisModel):
@@ -258,14 +284,10 @@ class SlipModel(HysteresisModel):
 
         ``limit``, shape (...), scales the thresholds. The states given do not change.
         """
-        x, limit, sliders = np.asarray(x, float), np.asarray(limit, float), np.asarray(state, float)
-        shape = np.broadcast_shapes(x.shape, limit.shape, sliders.shape[:-1])
-        n = (math.prod(shape), self.elements)
-        before = np.ascontiguousarray(np.broadcast_to(sliders, (*shape, n[1]))).reshape(n)
-        inputs, limits = (np.array(np.broadcast_to(v, shape)).reshape(-1) for v in (x, limit))
-        lag, after = np.empty(n[0]), np.empty(n)
+        shape, (inputs, limits), before = flat_rows((x, limit), state, self.elements)
+        lag, after = np.empty_like(inputs), np.empty_like(before)
         slip_rows(inputs, limits, *self.arrays, before, lag, after)
-        return lag.reshape(shape), after.reshape(*shape, n[1])
+        return lag.reshape(shape), after.reshape(*shape, self.elements)
 
     def step(self, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
         """Return the output, the input less its lag, and the state after it."""

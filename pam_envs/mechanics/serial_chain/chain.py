@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
+from pam_envs.mechanics.serial_chain.kernels import BLOCK_ROWS, gravity_rows
 from pam_envs.parameters import assumed
 
 MOST_JOINTS = 12
@@ -218,15 +219,17 @@ class SerialChain:
 
         ``angles`` [rad] have shape (..., n), ``payload`` [kg] shape (...) or ().
         """
-        axes, points, directions = self.frames(angles)
-        joints, load = points[..., :-1, :], np.asarray(payload, float)[..., None]
-        centres = joints + np.array(self.centres)[:, None] * directions
-        masses = np.array(self.masses)
-        beyond = np.cumsum(masses[::-1])[::-1] + load
-        moments = np.cumsum((masses[:, None] * centres)[..., ::-1, :], axis=-2)[..., ::-1, :]
-        moments = moments + load[..., None] * points[..., -1:, :]
-        arms = moments - beyond[..., None] * joints
-        return np.asarray(-np.cross(axes, arms) @ np.array(self.gravity))
+        given, load = self._angles(angles), np.asarray(payload, float)
+        shape = np.broadcast_shapes(given.shape[:-1], load.shape)
+        held = np.array(np.broadcast_to(given, (*shape, self.stages))).reshape(-1, self.stages)
+        masses = np.array(np.broadcast_to(load, shape)).reshape(-1)
+        torques, work = np.empty_like(held), np.empty(((self.stages + 1) * BLOCK_ROWS, 1))
+        gravity_rows(held, masses, self._column, work, torques)
+        return torques.reshape(*shape, self.stages)
+
+    @cached_property
+    def _column(self) -> Array:
+        return self.rows()[:, None]
 
     def energy(
         self, angles: ArrayLike, rates: ArrayLike, payload: float = 0.0

@@ -25,7 +25,7 @@ of ``n`` joints:
 from typing import Any
 
 from pam_envs.kernels.arithmetic import sine_and_cosine
-from pam_envs.kernels.build import LANES, kernel
+from pam_envs.kernels.build import LANES, entry, kernel
 
 N_STAGES = 6
 """Joints of the chain: a placeholder, replaced where a kernel is built for another number."""
@@ -119,9 +119,15 @@ def place_base(work: Any, base: int) -> None:
     """Write the frame of the base."""
     at = block(base, N_STAGES, 0)
     for j in range(LANES):
-        for r in range(12):
-            work[at + FRAME + r][j] = 0.0
-        work[at + FRAME][j] = work[at + FRAME + 4][j] = work[at + FRAME + 8][j] = 1.0
+        place_origin(work, at, j)
+
+
+@kernel
+def place_origin(work: Any, at: int, j: int) -> None:
+    """Write the base's frame into the block at a row."""
+    for r in range(12):
+        work[at + FRAME + r][j] = 0.0
+    work[at + FRAME][j] = work[at + FRAME + 4][j] = work[at + FRAME + 8][j] = 1.0
 
 
 @kernel
@@ -342,3 +348,35 @@ def eliminate(work: Any, base: int, right: int, k: int) -> None:
                 row[j] = row[j] - below[j] * (beside[j] * pivot[j])
         for j in range(LANES):
             work[right + i][j] = work[right + i][j] - below[j] * (pivot[j] * work[right + k][j])
+
+
+@entry
+def gravity_rows(angles: Any, payload: Any, chain: Any, work: Any, torques: Any) -> None:
+    """Write the torques [N m] that hold the chain at angles [rad], both of shape (rows, n).
+
+    ``payload``, shape (rows,), is in kg; ``chain`` has the parameters in a column, and ``work``
+    the scratch of the frames, shape ((n + 1) * BLOCK_ROWS, 1).
+    """
+    n = angles.shape[1]
+    gx, gy, gz = vector(chain, 0, 0)
+    for r in range(len(angles)):
+        place_origin(work, 0, 0)
+        for k in range(n):
+            link, was = GRAVITY_ROWS + LINK_ROWS * k, BLOCK_ROWS * k
+            place_link(work, chain, link, was + BLOCK_ROWS, was, angles[r][k : k + 1], 0)
+        mass = payload[r]
+        mx, my, mz = vector(work, BLOCK_ROWS * n + POINT, 0)
+        mx, my, mz = mass * mx, mass * my, mass * mz  # moments of all that follows
+        for back in range(n):
+            k = n - 1 - back
+            link, was = GRAVITY_ROWS + LINK_ROWS * k, BLOCK_ROWS * k
+            own, centre = chain[link + MASS][0], chain[link + CENTRE][0]
+            px, py, pz = vector(work, was + POINT, 0)
+            wx, wy, wz = vector(work, was + BLOCK_ROWS + DIRECTION, 0)
+            ax, ay, az = vector(work, was + BLOCK_ROWS + AXIS, 0)
+            mass = mass + own
+            mx = mx + own * (px + centre * wx)
+            my = my + own * (py + centre * wy)
+            mz = mz + own * (pz + centre * wz)
+            tx, ty, tz = cross(ax, ay, az, mx - mass * px, my - mass * py, mz - mass * pz)
+            torques[r][k] = -(tx * gx + ty * gy + tz * gz)

@@ -106,11 +106,15 @@ class Hysteresis(
     def stretched(self, pressure: ArrayLike, full: float) -> NDArray[np.float64]:
         """Return ``pressure`` [Pa] on the scale on which the friction is uniform."""
         p = np.asarray(pressure, float)
+        if self.stretch == 0.0:
+            return p
         return np.asarray(p * (1.0 + self.stretch * (1.0 - p / full)))
 
     def unstretched(self, value: ArrayLike, full: float) -> NDArray[np.float64]:
         """Return the pressure [Pa] whose stretched value is ``value``."""
         z, s = np.asarray(value, float), 1.0 + self.stretch
+        if self.stretch == 0.0:
+            return z
         root = np.sqrt(np.maximum(0.0, s * s - 4.0 * self.stretch * z / full))
         return np.asarray(2.0 * z / (s + root))
 

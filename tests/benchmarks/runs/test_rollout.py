@@ -119,6 +119,7 @@ def compared(env_id, kwargs, controller, seeds=SEEDS):
         ("PAM/MusclePositioning-v0", "inverse_pid", {"episode_seconds": 2.0, "load": None}),
         ("PAM/AntagonisticJoint-v0", "joint_mfc_mu", {"episode_seconds": 2.0}),
         ("PAM/KneeWalk-v0", "knee_inverse_ahead_ltr", {}),
+        ("PAM/RedundantManipulator-v0", "joint_random", {"episode_seconds": 1.0}),
     ],
 )
 def test_rows_of_a_batch_are_single_episodes_to_the_bit(env_id, name, kwargs, monkeypatch):
@@ -129,10 +130,18 @@ def test_rows_of_a_batch_are_single_episodes_to_the_bit(env_id, name, kwargs, mo
     assert len(rollout.run_all(partial(make_batch, env_id, kwargs), env, controller, (3, 4))) == 2
 
 
-def test_controller_that_draws_by_row_gets_batches_of_one(monkeypatch):
+class ByRow:
+    """A controller whose action is a function of the row's number."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        rows = np.arange(len(np.atleast_2d(observation)), dtype=np.float32)[:, None]
+        action = np.cos(rows)
+        return (action if np.ndim(observation) == 2 else action[0]), None
+
+
+def test_controller_that_acts_by_row_gets_batches_of_one(monkeypatch):
     env_id = "PAM/MusclePositioning-v0"
-    env = make_env(env_id, SHORT)
-    controller = controllers.make(controllers.find("random"), env.unwrapped.plant, env)
+    env, controller = make_env(env_id, SHORT), ByRow()
     first, *others = compared(env_id, SHORT, controller)
     assert all(np.array_equal(first.actions, other.actions) for other in others)
     monkeypatch.setattr(rollout, "run", None)  # not needed
