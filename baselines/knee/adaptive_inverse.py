@@ -1,0 +1,175 @@
+"""Adaptive inverse of the knee with a disturbance observer (astrom2008, ohnishi1996, magill1965).
+
+The anticipating inverse (:mod:`baselines.knee.anticipation`) with the estimated regulator, and with
+the hysteresis loop estimated as well. An operator ``H`` with its loop ``w`` times as wide and the
+gain ``a`` is linear in ``a`` and ``b = a w``:
+
+    s = a L(p) + b (H(p) - L(p)) + d,    T = s (L_muscle - L_min)
+
+``L`` is the line of the operator's total slope and ``d`` the disturbance [N/m]: what two numbers do
+not describe, such as a loop of another form. Recursive least squares with forgetting estimate ``a``
+and ``b`` from sensed tension and angle; a first-order lag filters the remaining difference to ``d``.
+The pressure is that of the regulator's model, so that neither estimate contains a dead time.
+
+The inverse solves ``H(p) = v`` with ``v = (s - d) / a + (1 - b / a) (v - L(p))`` by relaxed fixed
+points. The brace alone bends with the delay ``c / k`` of its damping and stiffness; the stretch of
+a planned tension is that of the angle delayed, moved by the difference of the sensed angle.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from baselines.core.controller import Prediction, RowController
+from baselines.core.entry import Bounds, Spec
+from baselines.knee.anticipation import (
+    ANTICIPATION,
+    KNOBS,
+    AnticipationState,
+    KneeAnticipation,
+    make_knee_anticipation,
+)
+from baselines.knee.nominal import KneeView
+from pam_envs.arrays import Array
+from pam_envs.hysteresis.protocol import RowsState
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+
+OBSERVER = 0.05
+"""Time constant [s] of the disturbance observer."""
+MEMORY = 4.0
+"""Time constant [s] of the forgetting of old samples."""
+GAIN_SPREAD, LOOP_SPREAD = 0.1, 0.3
+"""Standard deviations of ``a`` and ``b`` before the first sample."""
+ROUGHNESS = 0.01
+"""Standard deviation of a sample's stiffness over that of the full pressure."""
+ITERATIONS = 4
+SMALLEST, LARGEST = 0.5, 2.0
+"""Limits of ``a``; those of ``b / a`` are 0 and 2."""
+ADAPTIVE_KNOBS: Bounds = {**KNOBS, "observer": (0.2, 5.0), "memory": (0.2, 5.0)}
+
+
+class AdaptiveState(NamedTuple):
+    """State of the anticipating inverse, and estimates.
+
+    ``estimate``, shape (n_env, 2), holds ``a`` and ``b`` [1]; ``covariance``, (n_env, 3), their
+    variances and covariance; ``disturbance`` is in N/m, shape (n_env,).
+    """
+
+    forward: AnticipationState
+    estimate: Array
+    covariance: Array
+    disturbance: Array
+
+
+@dataclass(frozen=True)
+class BraceAnticipation(KneeAnticipation):
+    """Anticipating inverse of a brace that bends with a delay [control periods]."""
+
+    bending: float = 0.0
+
+    def _brace_stiffness(
+        self, view: KneeView, now: AnticipationState, ends: Array, reference: Array
+    ) -> Array:
+        if self.observer.stiffness:
+            return np.maximum(reference, 0.0)
+        nominal = self.observer.nominal
+        times = np.hstack([np.zeros((len(ends), 1)), ends]) - self.bending
+        earlier = np.maximum(times, -self.phase.present(now.plan)[:, None])
+        samples, _ = self.phase.read(now.plan, earlier)
+        angle = nominal.angle_of(samples[:, 0])
+        moved = view.angle - angle[:, 0]
+        return np.maximum(reference / nominal.stretch(angle[:, 1:] + moved[:, None]), 0.0)
+
+
+@dataclass(frozen=True)
+class KneeAdaptiveInverse(RowController):
+    """Adaptive inverse with a disturbance observer; see the module.
+
+    ``observer`` is the share of a difference that enters the disturbance in a period,
+    ``forgetting`` the share of the information that is kept.
+    """
+
+    forward: KneeAnticipation
+    observer: float
+    forgetting: float
+
+    def initial_state(self, observation: ArrayLike) -> AdaptiveState:
+        """Return the state at rest under the present setpoint, with nominal estimates."""
+        forward = self.forward.initial_state(observation)
+        n = len(forward.offset)
+        spread = np.array([GAIN_SPREAD**2, GAIN_SPREAD**2 + LOOP_SPREAD**2, GAIN_SPREAD**2])
+        return AdaptiveState(forward, np.ones((n, 2)), np.tile(spread, (n, 1)), np.zeros(n))
+
+    def respond(self, observation: ArrayLike, state: AdaptiveState) -> Prediction:
+        """Return the action and the next state."""
+        forward = self.forward.observed(observation, state.forward)
+        now = self._estimated(observation, state._replace(forward=forward))
+        inverse = partial(self._inverse, now)
+        action, after = self.forward.answer(observation, forward, inverse=inverse)
+        return action, now._replace(forward=after)
+
+    @cached_property
+    def _slope(self) -> float:
+        """Stiffness over pressure of the line [N/(m Pa)]."""
+        nominal = self.forward.observer.nominal
+        return nominal.per_output * float(nominal.plant.hysteresis.operator.numbers()[0])
+
+    def _estimated(self, observation: ArrayLike, state: AdaptiveState) -> AdaptiveState:
+        """Return the state with the estimates after an observation."""
+        forward, view = state.forward, self.forward.observer.read(observation)
+        nominal, pressure = self.forward.observer.nominal, self.forward.bank.now(forward.bank)
+        full = self._slope * nominal.full_pressure
+        line = self._slope * pressure / full
+        loop = nominal.stiffness_after(pressure, forward.hysteresis) / full - line
+        sensed = view.tension / view.stretch / full
+        a, b = state.estimate.T
+        p, q, r = state.covariance.T / self.forgetting
+        error = sensed - a * line - b * loop
+        x, y = p * line + r * loop, r * line + q * loop
+        variance = ROUGHNESS**2 + line * x + loop * y
+        a = np.clip(a + x / variance * error, SMALLEST, LARGEST)
+        b = np.clip(b + y / variance * error, 0.0, 2.0 * a)
+        spread = np.stack([p - x * x / variance, q - y * y / variance, r - x * y / variance], 1)
+        off = full * (sensed - a * line - b * loop)
+        disturbance = state.disturbance + self.observer * (off - state.disturbance)
+        return AdaptiveState(forward, np.stack([a, b], 1), spread, disturbance)
+
+    def _inverse(self, now: AdaptiveState, stiffness: Array, later: RowsState) -> Array:
+        """Return the pressures [Pa] of stiffnesses [N/m] for the estimates."""
+        a, b = now.estimate.T[..., None]
+        share = 1.0 - b / a
+        aim = np.maximum(stiffness - now.disturbance[:, None], 0.0) / a
+        value = aim
+        pressure = self.forward.pressures(value, later)
+        for _ in range(ITERATIONS):
+            off = value - aim - share * (value - self._slope * pressure)
+            value = np.maximum(value - off / (1.0 + share), 0.0)
+            pressure = self.forward.pressures(value, later)
+        return pressure
+
+
+def make_knee_adaptive_inverse(spec: Spec[KneeOrthosis]) -> KneeAdaptiveInverse:
+    """Return the controller."""
+    lever, period = spec.plant.lever, spec.plant.control_period
+    made = make_knee_anticipation(spec, adaptive=True)
+    bending = lever.damping / lever.stiffness / period if spec.plant.mounting == "no_load" else 0.0
+    forward = BraceAnticipation(**vars(made), bending=bending)
+    return KneeAdaptiveInverse(
+        forward,
+        -np.expm1(-period / (spec.knob("observer") * OBSERVER)),
+        np.exp(-period / (spec.knob("memory") * MEMORY)),
+    )
+
+
+ENTRIES = {
+    "knee_adaptive_inverse": ANTICIPATION(
+        "knee_anticipating_adaptive, gain and loop width by least squares, disturbance observer",
+        make=make_knee_adaptive_inverse,
+        feedback=True,
+        citation="yeh2010; bertsekas2017; magill1965; ohnishi1996",
+        knobs=ADAPTIVE_KNOBS,
+    ),
+}
