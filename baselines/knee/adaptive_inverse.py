@@ -16,6 +16,7 @@ points. The brace alone bends with the delay ``c / k`` of its damping and stiffn
 a planned tension is that of the angle delayed, moved by the difference of the sensed angle.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -32,12 +33,11 @@ from baselines.knee.anticipation import (
     KneeAnticipation,
     make_knee_anticipation,
 )
-from baselines.knee.nominal import KneeView
 from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
-OBSERVER = 0.05
+OBSERVER = 0.1
 """Time constant [s] of the disturbance observer."""
 MEMORY = 4.0
 """Time constant [s] of the forgetting of old samples."""
@@ -66,22 +66,32 @@ class AdaptiveState(NamedTuple):
 
 @dataclass(frozen=True)
 class BraceAnticipation(KneeAnticipation):
-    """Anticipating inverse of a brace that bends with a delay [control periods]."""
+    """Anticipating inverse of the brace alone, whose offset is the angle's from the plan [rad].
+
+    The brace bends ``bending`` [control periods] late; ``share`` of a difference enters the offset
+    in a period.
+    """
 
     bending: float = 0.0
+    share: float = 1.0
 
-    def _brace_stiffness(
-        self, view: KneeView, now: AnticipationState, ends: Array, reference: Array
-    ) -> Array:
+    def observed(self, observation: ArrayLike, state: AnticipationState) -> AnticipationState:
+        """Return the state with what an observation shows of plan, brace and plant."""
+        now = super().observed(observation, state)
+        planned = self._angles(now, np.zeros((len(now.offset), 1)))[:, 0]
+        off = self.observer.read(observation).angle - planned
+        return now._replace(offset=now.offset + self.share * (off - now.offset))
+
+    def _brace_stiffness(self, now: AnticipationState, ends: Array, reference: Array) -> Array:
         if self.observer.stiffness:
             return np.maximum(reference, 0.0)
-        nominal = self.observer.nominal
-        times = np.hstack([np.zeros((len(ends), 1)), ends]) - self.bending
-        earlier = np.maximum(times, -self.phase.present(now.plan)[:, None])
-        samples, _ = self.phase.read(now.plan, earlier)
-        angle = nominal.angle_of(samples[:, 0])
-        moved = view.angle - angle[:, 0]
-        return np.maximum(reference / nominal.stretch(angle[:, 1:] + moved[:, None]), 0.0)
+        angle = self._angles(now, ends) + now.offset[:, None]
+        return np.maximum(reference / self.observer.nominal.stretch(angle), 0.0)
+
+    def _angles(self, now: AnticipationState, ends: Array) -> Array:
+        """Return the planned angles [rad] of the bending brace, shape (n_env, n_times)."""
+        times = np.maximum(ends - self.bending, -self.phase.present(now.plan)[:, None])
+        return self.observer.nominal.angle_of(self.phase.read(now.plan, times)[0][:, 0])
 
 
 @dataclass(frozen=True)
@@ -156,12 +166,10 @@ def make_knee_adaptive_inverse(spec: Spec[KneeOrthosis]) -> KneeAdaptiveInverse:
     lever, period = spec.plant.lever, spec.plant.control_period
     made = make_knee_anticipation(spec, adaptive=True)
     bending = lever.damping / lever.stiffness / period if spec.plant.mounting == "no_load" else 0.0
-    forward = BraceAnticipation(**vars(made), bending=bending)
-    return KneeAdaptiveInverse(
-        forward,
-        -np.expm1(-period / (spec.knob("observer") * OBSERVER)),
-        np.exp(-period / (spec.knob("memory") * MEMORY)),
-    )
+    share = -math.expm1(-period / (spec.knob("observer") * OBSERVER))
+    if not made.observer.gait:
+        made = BraceAnticipation(**vars(made), bending=bending, share=share)
+    return KneeAdaptiveInverse(made, share, math.exp(-period / (spec.knob("memory") * MEMORY)))
 
 
 ENTRIES = {

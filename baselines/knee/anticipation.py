@@ -235,7 +235,7 @@ class KneeAnticipation(RowController):
         samples, known = self.phase.read(plan, ends)
         weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
         if not self.observer.gait:
-            return self._brace_stiffness(view, now, ends, samples[:, 0]), weight
+            return self._brace_stiffness(now, ends, samples[:, 0]), weight
         tension, angle = samples[:, 0], samples[:, 1]
         here, _ = self.phase.read(plan, np.zeros((len(ends), 1)))
         deviation = view.angle - here[:, 1, 0]
@@ -250,9 +250,7 @@ class KneeAnticipation(RowController):
         weight = weight * np.where(stance, 1.0, self.swing) * (stretch / USUAL_STRETCH) ** 2
         return np.where(stance, np.maximum(tension, 0.0), free) / stretch, weight
 
-    def _brace_stiffness(
-        self, view: KneeView, now: AnticipationState, ends: Array, reference: Array
-    ) -> Array:
+    def _brace_stiffness(self, now: AnticipationState, ends: Array, reference: Array) -> Array:
         """Return stiffnesses [N/m] of the brace alone for previewed references."""
         nominal = self.observer.nominal
         if self.observer.stiffness:
