@@ -46,8 +46,8 @@ GAIN_SPREAD, LOOP_SPREAD = 0.1, 0.3
 ROUGHNESS = 0.01
 """Standard deviation of a sample's stiffness over that of the full pressure."""
 ITERATIONS = 4
-SMALLEST, LARGEST = 0.5, 2.0
-"""Limits of ``a``; those of ``b / a`` are 0 and 2."""
+GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
+"""Limits of ``a`` and of the width ``b / a``; a wider loop would have no increasing inverse."""
 ADAPTIVE_KNOBS: Bounds = {**KNOBS, "observer": (0.2, 5.0), "memory": (0.2, 5.0)}
 
 
@@ -140,8 +140,8 @@ class KneeAdaptiveInverse(RowController):
         error = sensed - a * line - b * loop
         x, y = p * line + r * loop, r * line + q * loop
         variance = ROUGHNESS**2 + line * x + loop * y
-        a = np.clip(a + x / variance * error, SMALLEST, LARGEST)
-        b = np.clip(b + y / variance * error, 0.0, 2.0 * a)
+        a = np.clip(a + x / variance * error, *GAINS)
+        b = np.clip(b + y / variance * error, WIDTHS[0] * a, WIDTHS[1] * a)
         spread = np.stack([p - x * x / variance, q - y * y / variance, r - x * y / variance], 1)
         off = full * (sensed - a * line - b * loop)
         disturbance = state.disturbance + self.observer * (off - state.disturbance)
