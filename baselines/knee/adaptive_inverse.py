@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Prediction, RowController
+from baselines.core.controller import Prediction, RowController, Rows
 from baselines.core.entry import Bounds, Spec
 from baselines.knee.anticipation import (
     ANTICIPATION,
@@ -33,6 +33,7 @@ from baselines.knee.anticipation import (
     KneeAnticipation,
     make_knee_anticipation,
 )
+from baselines.knee.plan import Plan
 from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -46,9 +47,11 @@ GAIN_SPREAD, LOOP_SPREAD = 0.1, 0.3
 ROUGHNESS = 0.01
 """Standard deviation of a sample's stiffness over that of the full pressure."""
 ITERATIONS = 4
+TREND = 15.0
+"""Time constant [periods] with which the trend of an unknown stride fades."""
 GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
 """Limits of ``a`` and of the width ``b / a``; a wider loop would have no increasing inverse."""
-ADAPTIVE_KNOBS: Bounds = {**KNOBS, "observer": (0.2, 5.0), "memory": (0.2, 5.0)}
+ADAPTIVE_KNOBS: Bounds = {**KNOBS, "observer": (0.2, 5.0), "memory": (0.2, 5.0), "trend": (0.01, 10.0)}
 
 
 class AdaptiveState(NamedTuple):
@@ -92,6 +95,24 @@ class BraceAnticipation(KneeAnticipation):
         """Return the planned angles [rad] of the bending brace, shape (n_env, n_times)."""
         times = np.maximum(ends - self.bending, -self.phase.present(now.plan)[:, None])
         return self.observer.nominal.angle_of(self.phase.read(now.plan, times)[0][:, 0])
+
+
+@dataclass(frozen=True)
+class GaitAnticipation(KneeAnticipation):
+    """Anticipating inverse of a gait; an unknown tension goes on with the last trend, fading."""
+
+    fading: float = TREND
+
+    def _ahead(self, plan: Plan, ends: Array) -> tuple[Array, Rows]:
+        samples, known = self.phase.read(plan, ends)
+        ahead = self.phase.memory.ahead
+        last = (plan.seen.step + ahead[-1])[:, None].astype(float)
+        near, _ = self.phase.memory.read(plan.seen, last + np.array([ahead[-2] - ahead[-1], 0.0]))
+        slope = (near[:, 0, 1] - near[:, 0, 0]) / (ahead[-1] - ahead[-2])
+        beyond = np.maximum(self.phase.present(plan)[:, None] + ends - last, 0.0)
+        more = slope[:, None] * self.fading * -np.expm1(-beyond / self.fading)
+        samples[:, 0] = np.where(known, samples[:, 0], np.maximum(samples[:, 0] + more, 0.0))
+        return samples, known
 
 
 @dataclass(frozen=True)
@@ -167,7 +188,9 @@ def make_knee_adaptive_inverse(spec: Spec[KneeOrthosis]) -> KneeAdaptiveInverse:
     made = make_knee_anticipation(spec, adaptive=True)
     bending = lever.damping / lever.stiffness / period if spec.plant.mounting == "no_load" else 0.0
     share = -math.expm1(-period / (spec.knob("observer") * OBSERVER))
-    if not made.observer.gait:
+    if made.observer.gait:
+        made = GaitAnticipation(**vars(made), fading=spec.knob("trend") * TREND)
+    else:
         made = BraceAnticipation(**vars(made), bending=bending, share=share)
     return KneeAdaptiveInverse(made, share, math.exp(-period / (spec.knob("memory") * MEMORY)))
 

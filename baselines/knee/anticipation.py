@@ -59,7 +59,7 @@ TORQUE_NOISE = 0.4
 """Difference [N m] of the torque in stance from the plan."""
 USUAL_STRETCH = 0.05
 """Stretch [m] whose errors of the tension have the weight 1."""
-KEPT = 60.0
+KEPT = 300.0
 """Time constant [periods] for which the reference keeps its distance from the plan."""
 MISMATCH = 0.1
 """Likelihood that the plan is in stance and the wearer not, or the reverse, at the right shift."""
@@ -225,14 +225,15 @@ class KneeAnticipation(RowController):
         path = ((view.angle_reference[:, None] - angle) / ANGLE_NOISE)[:, None]
         fit = np.exp(-0.5 * np.where(stance[..., None], off, path) ** 2)
         sure = np.where(stance, MISMATCH, MISMATCH * fit[:, 0])[:, None]
-        return np.where((planned == stance)[:, None], fit, sure)
+        slack = self.observer.nominal.free_tension(angle) <= SMALLEST
+        return np.where(((planned | (stance & slack)) == stance)[:, None], fit, sure)
 
     def _demands(
         self, view: KneeView, now: AnticipationState, ends: Array, more: Correction | None
     ) -> tuple[Array, Array]:
         """Return stiffnesses [N/m] and weights at the nodes, shape (n_env, n_nodes)."""
         nominal, plan = self.observer.nominal, now.plan
-        samples, known = self.phase.read(plan, ends)
+        samples, known = self._ahead(plan, ends)
         weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
         if not self.observer.gait:
             return self._brace_stiffness(now, ends, samples[:, 0]), weight
@@ -249,6 +250,10 @@ class KneeAnticipation(RowController):
         stretch = nominal.stretch(angle + deviation[:, None])
         weight = weight * np.where(stance, 1.0, self.swing) * (stretch / USUAL_STRETCH) ** 2
         return np.where(stance, np.maximum(tension, 0.0), free) / stretch, weight
+
+    def _ahead(self, plan: Plan, ends: Array) -> tuple[Array, Rows]:
+        """Return the planned samples after ``ends`` periods, and where they are known."""
+        return self.phase.read(plan, ends)
 
     def _brace_stiffness(self, now: AnticipationState, ends: Array, reference: Array) -> Array:
         """Return stiffnesses [N/m] of the brace alone for previewed references."""
