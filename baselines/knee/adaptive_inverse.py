@@ -51,7 +51,12 @@ TREND = 15.0
 """Time constant [periods] with which the trend of an unknown stride fades."""
 GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
 """Limits of ``a`` and of the width ``b / a``; a wider loop would have no increasing inverse."""
-ADAPTIVE_KNOBS: Bounds = {**KNOBS, "observer": (0.2, 5.0), "memory": (0.2, 5.0), "trend": (0.01, 10.0)}
+ADAPTIVE_KNOBS: Bounds = {
+    **KNOBS,
+    "observer": (0.2, 5.0),
+    "memory": (0.2, 5.0),
+    "trend": (0.01, 10.0),
+}
 
 
 class AdaptiveState(NamedTuple):
