@@ -6,10 +6,10 @@ gain ``a`` is linear in ``a`` and ``b = a w``:
 
     s = a L(p) + b (H(p) - L(p)) + d,    T = s (L_muscle - L_min)
 
-``L`` is the line of the operator's total slope and ``d`` the disturbance [N/m]: what two numbers do
-not describe, such as a loop of another form. Recursive least squares with forgetting estimate ``a``
-and ``b`` from sensed tension and angle; a first-order lag filters the remaining difference to ``d``.
-The pressure is that of the regulator's model, so that neither estimate contains a dead time.
+``L`` is the line of the operator's total slope and ``d`` the disturbance [N/m]: what two numbers
+do not describe, such as a loop of another form. Recursive least squares with forgetting estimate
+``a`` and ``b`` from sensed tension and angle; a first-order lag filters the remaining difference to
+``d``. The pressure is that of the regulator's model, so that neither estimate contains a dead time.
 
 The inverse solves ``H(p) = v`` with ``v = (s - d) / a + (1 - b / a) (v - L(p))`` by relaxed fixed
 points. The brace alone bends with the delay ``c / k`` of its damping and stiffness; the stretch of
@@ -28,7 +28,6 @@ from baselines.core.controller import Prediction, RowController, Rows
 from baselines.core.entry import Bounds, Spec
 from baselines.knee.anticipation import (
     ANTICIPATION,
-    KNOBS,
     AnticipationState,
     KneeAnticipation,
     make_knee_anticipation,
@@ -42,20 +41,22 @@ OBSERVER = 0.1
 """Time constant [s] of the disturbance observer."""
 MEMORY = 4.0
 """Time constant [s] of the forgetting of old samples."""
-GAIN_SPREAD, LOOP_SPREAD = 0.1, 0.3
-"""Standard deviations of ``a`` and ``b`` before the first sample."""
+BEFORE = np.array([0.01, 0.1, 0.01])
+"""Variances and covariance of ``a`` and ``b`` before the first sample: gain 10 %, width 30 %; old
+samples are forgotten no further than to these."""
 ROUGHNESS = 0.01
 """Standard deviation of a sample's stiffness over that of the full pressure."""
 ITERATIONS = 4
+"""Fixed points of the inverse: they leave 1 % of the correction for another width."""
 TREND = 15.0
 """Time constant [periods] with which the trend of an unknown stride fades."""
 GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
 """Limits of ``a`` and of the width ``b / a``; a wider loop would have no increasing inverse."""
 ADAPTIVE_KNOBS: Bounds = {
-    **KNOBS,
+    "swing": (0.03, 10.0),
     "observer": (0.2, 5.0),
     "memory": (0.2, 5.0),
-    "trend": (0.01, 10.0),
+    "trend": (0.1, 10.0),
 }
 
 
@@ -136,8 +137,7 @@ class KneeAdaptiveInverse(RowController):
         """Return the state at rest under the present setpoint, with nominal estimates."""
         forward = self.forward.initial_state(observation)
         n = len(forward.offset)
-        spread = np.array([GAIN_SPREAD**2, GAIN_SPREAD**2 + LOOP_SPREAD**2, GAIN_SPREAD**2])
-        return AdaptiveState(forward, np.ones((n, 2)), np.tile(spread, (n, 1)), np.zeros(n))
+        return AdaptiveState(forward, np.ones((n, 2)), np.tile(BEFORE, (n, 1)), np.zeros(n))
 
     def respond(self, observation: ArrayLike, state: AdaptiveState) -> Prediction:
         """Return the action and the next state."""
@@ -151,7 +151,8 @@ class KneeAdaptiveInverse(RowController):
     def _slope(self) -> float:
         """Stiffness over pressure of the line [N/(m Pa)]."""
         nominal = self.forward.observer.nominal
-        return nominal.per_output * float(nominal.plant.hysteresis.operator.numbers()[0])
+        operator = nominal.plant.hysteresis.scaled
+        return nominal.per_output * (1.0 if operator is None else operator.numbers()[0])
 
     def _estimated(self, observation: ArrayLike, state: AdaptiveState) -> AdaptiveState:
         """Return the state with the estimates after an observation."""
@@ -169,6 +170,7 @@ class KneeAdaptiveInverse(RowController):
         a = np.clip(a + x / variance * error, *GAINS)
         b = np.clip(b + y / variance * error, WIDTHS[0] * a, WIDTHS[1] * a)
         spread = np.stack([p - x * x / variance, q - y * y / variance, r - x * y / variance], 1)
+        spread *= np.minimum(1.0, np.min(BEFORE[:2] / spread[:, :2], axis=1))[:, None]
         off = full * (sensed - a * line - b * loop)
         disturbance = state.disturbance + self.observer * (off - state.disturbance)
         return AdaptiveState(forward, np.stack([a, b], 1), spread, disturbance)

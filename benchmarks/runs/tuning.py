@@ -218,10 +218,10 @@ def open_study(job: Job) -> optuna.Study:
         sources_digest([controllers.ROOT / "pam_envs"], SOURCES),
     ]
     bounds = {name: list(ends) for name, ends in job.bounds.items()}
-    task = digest(
-        [track_of(job.env, job.plants).content, bounds, code]
-    )  # excluding results of searches
-    name = f"{tuned_name(job.controller, job.env, job.plants)}, {job.episodes} episodes, seed {job.seed}"
+    content = track_of(job.env, job.plants).content
+    task = digest([content, bounds, code])  # excluding results of searches
+    entry = tuned_name(job.controller, job.env, job.plants)
+    name = f"{entry}, {job.episodes} episodes, seed {job.seed}"
     study = optuna.create_study(
         storage=RDBStorage(url, engine_kwargs=patience),
         study_name=f"{name}, {task[:12]}",
