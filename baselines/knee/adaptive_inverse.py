@@ -48,6 +48,10 @@ ROUGHNESS = 0.01
 """Standard deviation of a sample's stiffness over that of the full pressure."""
 ITERATIONS = 4
 """Fixed points of the inverse: they leave 1 % of the correction for another width."""
+PRESSURE = 0.3e5
+"""Height [Pa] of the probe: beyond the rate limit of most regulators."""
+PROBE, PROBED = (5, 20), 6
+"""Begin and end [periods] of the probe, and the nodes of the horizon that it moves."""
 TREND = 15.0
 """Time constant [periods] with which the trend of an unknown stride fades."""
 GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
@@ -57,6 +61,7 @@ ADAPTIVE_KNOBS: Bounds = {
     "observer": (0.2, 5.0),
     "memory": (0.2, 5.0),
     "trend": (0.1, 10.0),
+    "probe": (0.01, 3.0),
 }
 
 
@@ -132,6 +137,7 @@ class KneeAdaptiveInverse(RowController):
     forward: KneeAnticipation
     observer: float
     forgetting: float
+    probe: float
 
     def initial_state(self, observation: ArrayLike) -> AdaptiveState:
         """Return the state at rest under the present setpoint, with nominal estimates."""
@@ -143,9 +149,23 @@ class KneeAdaptiveInverse(RowController):
         """Return the action and the next state."""
         forward = self.forward.observed(observation, state.forward)
         now = self._estimated(observation, state._replace(forward=forward))
-        inverse = partial(self._inverse, now)
+        inverse = partial(self._probed, now, self._probe(observation, forward))
         action, after = self.forward.answer(observation, forward, inverse=inverse)
         return action, now._replace(forward=after)
+
+    def _probe(self, observation: ArrayLike, forward: AnticipationState) -> Array:
+        """Return the pressure [Pa] that shows the regulator in a first swing, shape (n_env,)."""
+        step = forward.plan.seen.step
+        free = ~self.forward.observer.read(observation).stance
+        return np.where(free & (step >= PROBE[0]) & (step < PROBE[1]), self.probe, 0.0)
+
+    def _probed(
+        self, now: AdaptiveState, probe: Array, stiffness: Array, later: RowsState
+    ) -> Array:
+        """Return the pressures [Pa] of :meth:`_inverse`, the next ones higher by the probe."""
+        pressure = self._inverse(now, stiffness, later)
+        pressure[:, :PROBED] += probe[:, None]
+        return pressure
 
     @cached_property
     def _slope(self) -> float:
@@ -199,7 +219,8 @@ def make_knee_adaptive_inverse(spec: Spec[KneeOrthosis]) -> KneeAdaptiveInverse:
         made = GaitAnticipation(**vars(made), fading=spec.knob("trend") * TREND)
     else:
         made = BraceAnticipation(**vars(made), bending=bending, share=share)
-    return KneeAdaptiveInverse(made, share, math.exp(-period / (spec.knob("memory") * MEMORY)))
+    forgetting = math.exp(-period / (spec.knob("memory") * MEMORY))
+    return KneeAdaptiveInverse(made, share, forgetting, spec.knob("probe") * PRESSURE)
 
 
 ENTRIES = {
