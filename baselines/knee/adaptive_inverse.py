@@ -48,7 +48,7 @@ ROUGHNESS = 0.01
 """Standard deviation of a sample's stiffness over that of the full pressure."""
 ITERATIONS = 4
 """Fixed points of the inverse: they leave 1 % of the correction for another width."""
-PRESSURE = 0.3e5
+PRESSURE = 0.5e5
 """Height [Pa] of the probe: beyond the rate limit of most regulators."""
 PROBE, PROBED = (5, 20), 6
 """Begin and end [periods] of the probe, and the nodes of the horizon that it moves."""
