@@ -52,7 +52,7 @@ PRESSURE = 0.5e5
 """Height [Pa] of the probe: beyond the rate limit of most regulators."""
 PROBE, PROBED = (5, 20), 6
 """Begin and end [periods] of the probe, and the nodes of the horizon that it moves."""
-TREND = 15.0
+TREND = 45.0
 """Time constant [periods] with which the trend of an unknown stride fades."""
 GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
 """Limits of ``a`` and of the width ``b / a``; a wider loop would have no increasing inverse."""
@@ -60,7 +60,7 @@ ADAPTIVE_KNOBS: Bounds = {
     "swing": (0.03, 10.0),
     "observer": (0.2, 5.0),
     "memory": (0.2, 5.0),
-    "trend": (0.1, 10.0),
+    "trend": (0.05, 5.0),
     "probe": (0.01, 3.0),
 }
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pam_envs.arrays import Array
 from pam_envs.parameters import declarations
 
-POINTS = {"dead_time": 9, "time_constant": 4, "slew_rate": 6}
+POINTS = {"dead_time": 9, "time_constant": 4, "slew_rate": 11}
 """Candidates over the declared range of each parameter."""
 MEMORY = 500.0
 """Time constant [periods] of the sum of squared deviations."""
