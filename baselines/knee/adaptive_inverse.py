@@ -1,4 +1,4 @@
-"""Adaptive inverse of the knee with a disturbance observer (astrom2008, ohnishi1996, magill1965).
+"""Adaptive inverse of the knee with a disturbance observer (ohnishi1996, magill1965).
 
 The anticipating inverse (:mod:`baselines.knee.anticipation`) with the estimated regulator, and with
 the hysteresis loop estimated as well. An operator ``H`` with its loop ``w`` times as wide and the
@@ -14,6 +14,10 @@ do not describe, such as a loop of another form. Recursive least squares with fo
 The inverse solves ``H(p) = v`` with ``v = (s - d) / a + (1 - b / a) (v - L(p))`` by relaxed fixed
 points. The brace alone bends with the delay ``c / k`` of its damping and stiffness; the stretch of
 a planned tension is that of the angle delayed, moved by the difference of the sensed angle.
+
+In a gait the regulator is at rest until the first stance, so that nothing shows its rate limit. A
+small probe in a first swing, where the tension is not tracked, lets the bank of regulators choose.
+Beyond the preview an unknown stride goes on with the last trend.
 """
 
 import math
@@ -228,7 +232,7 @@ ENTRIES = {
         "knee_anticipating_adaptive, gain and loop width by least squares, disturbance observer",
         make=make_knee_adaptive_inverse,
         feedback=True,
-        citation="yeh2010; bertsekas2017; magill1965; ohnishi1996",
+        citation="yeh2010; bertsekas2017; thrun2005; magill1965; ohnishi1996",
         knobs=ADAPTIVE_KNOBS,
     ),
 }
