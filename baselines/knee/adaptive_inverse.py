@@ -83,19 +83,30 @@ class AdaptiveState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BraceAnticipation(KneeAnticipation):
-    """Anticipating inverse of the brace alone, whose offset is the angle's from the plan [rad].
+class TrendAnticipation(KneeAnticipation):
+    """Anticipating inverse with a bending brace, or with the trend of an unknown stride.
 
-    The brace bends ``bending`` [control periods] late; ``share`` of a difference enters the offset
-    in a period.
+    The offset of the brace alone is that of its angle from the plan [rad].
+
+    Attributes
+    ----------
+    bending : float
+        Delay with which the brace bends [control periods].
+    share : float
+        Share of a difference that enters the offset in a period.
+    fading : float
+        Time constant with which the last trend of a gait's tension fades [control periods].
     """
 
-    bending: float = 0.0
-    share: float = 1.0
+    bending: float
+    share: float
+    fading: float
 
     def observed(self, observation: ArrayLike, state: AnticipationState) -> AnticipationState:
         """Return the state with what an observation shows of plan, brace and plant."""
         now = super().observed(observation, state)
+        if self.observer.gait:
+            return now
         planned = self._angles(now, np.zeros((len(now.offset), 1)))[:, 0]
         off = self.observer.read(observation).angle - planned
         return now._replace(offset=now.offset + self.share * (off - now.offset))
@@ -111,16 +122,11 @@ class BraceAnticipation(KneeAnticipation):
         times = np.maximum(ends - self.bending, -self.phase.present(now.plan)[:, None])
         return self.observer.nominal.angle_of(self.phase.read(now.plan, times)[0][:, 0])
 
-
-@dataclass(frozen=True)
-class GaitAnticipation(KneeAnticipation):
-    """Anticipating inverse of a gait; an unknown tension goes on with the last trend, fading."""
-
-    fading: float = TREND
-
     def _ahead(self, plan: Plan, ends: Array) -> tuple[Array, Rows]:
         samples, known = self.phase.read(plan, ends)
         ahead = self.phase.memory.ahead
+        if not self.observer.gait or len(ahead) < 2:
+            return samples, known
         last = (plan.seen.step + ahead[-1])[:, None].astype(float)
         near, _ = self.phase.memory.read(plan.seen, last + np.array([ahead[-2] - ahead[-1], 0.0]))
         slope = (near[:, 0, 1] - near[:, 0, 0]) / (ahead[-1] - ahead[-2])
@@ -219,12 +225,10 @@ def make_knee_adaptive_inverse(spec: Spec[KneeOrthosis]) -> KneeAdaptiveInverse:
     made = make_knee_anticipation(spec, adaptive=True)
     bending = lever.damping / lever.stiffness / period if spec.plant.mounting == "no_load" else 0.0
     share = -math.expm1(-period / (spec.knob("observer") * OBSERVER))
-    if made.observer.gait:
-        made = GaitAnticipation(**vars(made), fading=spec.knob("trend") * TREND)
-    else:
-        made = BraceAnticipation(**vars(made), bending=bending, share=share)
+    fading = spec.knob("trend") * TREND
+    forward = TrendAnticipation(**vars(made), bending=bending, share=share, fading=fading)
     forgetting = math.exp(-period / (spec.knob("memory") * MEMORY))
-    return KneeAdaptiveInverse(made, share, forgetting, spec.knob("probe") * PRESSURE)
+    return KneeAdaptiveInverse(forward, share, forgetting, spec.knob("probe") * PRESSURE)
 
 
 ENTRIES = {
