@@ -304,6 +304,7 @@ def tune(
     trials: int = 20,
     seed: int = 0,
     episodes: int = 30,
+    plants: Literal["nominal", "drawn"] = "nominal",
     write: bool = False,
     storage: Path | None = None,
 ) -> int:
@@ -315,6 +316,7 @@ def tune(
         trials: Number of settings to try, including those of earlier calls.
         seed: Seed of the sampler.
         episodes: Minimum number of episodes per trial.
+        plants: Episodes of the nominal track, or of the randomised one, whose plants are drawn.
         write: Write the result into baselines/core/tuned.yaml, which the catalogue reads.
         storage: SQLite file of the trials, runs/tuning.db by default.
     """
@@ -322,8 +324,9 @@ def tune(
     from benchmarks.runs import tuning
 
     more = {} if storage is None else {"storage": storage}
-    job = tuning.job_of(controller, env, trials=trials, seed=seed, episodes=episodes, **more)
-    course = tuning.Course(controller, tuning.nominal_track(job.env), episodes)
+    how = {"trials": trials, "seed": seed, "episodes": episodes, "plants": plants, **more}
+    job = tuning.job_of(controller, env, **how)
+    course = tuning.Course(controller, tuning.track_of(job.env, plants), episodes)
     with database_named(job.storage), progress("trials") as start:
         found = tuning.search(job, course.measure, start)
     print(tuning.sentence(found))

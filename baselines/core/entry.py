@@ -39,6 +39,9 @@ Bounds = Mapping[str, tuple[float, float]]
 
 AS_DESIGNED: Knobs = MappingProxyType({})
 
+Plants = Literal["nominal", "drawn"]
+"""Plants of a search over knobs: the nominal one, or one drawn in each episode."""
+
 Knowledge = Literal["nothing", "tables", "nominal model", "true model"]
 
 

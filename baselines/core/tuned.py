@@ -1,8 +1,9 @@
 """Controllers with knobs from a search: reader of ``tuned.yaml``.
 
 The search (``python -m benchmarks tune``) uses the same number of trials and the same tuning seeds
-as the search over a learned controller's settings. Its result is for one environment, and is a
-separate entry beside the controller as published.
+as the search over a learned controller's settings. Its result is for one environment, on its
+nominal plant or on plants drawn in each episode, and is a separate entry beside the controller as
+published.
 """
 
 import math
@@ -11,11 +12,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from baselines.core.entry import SUFFIXES, Bounds, Entry, Knobs, check_knobs
+from baselines.core.entry import SUFFIXES, Bounds, Entry, Knobs, Plants, check_knobs
 from pam_envs import yaml_file
 
 FILE = Path(__file__).with_name("tuned.yaml")
 SCHEMA = 1
+_OF_PLANTS: Mapping[Plants, str] = {"nominal": "", "drawn": " of drawn plants"}
 EDGE = 0.05
 """Distance from an end of the search, over its logarithmic range, that counts as on the bound."""
 
@@ -34,6 +36,8 @@ class Tuned:
         Objective with all knobs at 1 and with these [SI]; lower is better.
     command : str
         Command that repeats the search.
+    plants : {"nominal", "drawn"}
+        Plants of the search's episodes; not written if nominal.
     """
 
     controller: str
@@ -45,11 +49,12 @@ class Tuned:
     before: float
     after: float
     command: str
+    plants: Plants = "nominal"
 
     @property
     def name(self) -> str:
         """Name in the catalogue."""
-        return tuned_name(self.controller, self.env)
+        return tuned_name(self.controller, self.env, self.plants)
 
     @property
     def on_bounds(self) -> tuple[str, ...]:
@@ -62,9 +67,10 @@ class Tuned:
         )
 
 
-def tuned_name(controller: str, env: str) -> str:
-    """Return the name in the catalogue of a controller tuned in an environment."""
-    return "_".join(word for word in (controller, "tuned", SUFFIXES.get(env, "")) if word)
+def tuned_name(controller: str, env: str, plants: Plants = "nominal") -> str:
+    """Return the name in the catalogue of a controller tuned in an environment, on some plants."""
+    kind = "" if plants == "nominal" else plants
+    return "_".join(word for word in (controller, "tuned", kind, SUFFIXES.get(env, "")) if word)
 
 
 def read(file: Path = FILE) -> dict[str, Tuned]:
@@ -113,7 +119,7 @@ def entries(plain: Mapping[str, Entry], found: Mapping[str, Tuned]) -> dict[str,
             base,
             summary=f"{made.controller} with {', '.join(made.knobs)} as found by a search",
             envs=(made.env,),
-            tuning=f"Optuna TPE, {made.trials} trials on tuning seeds",
+            tuning=f"Optuna TPE, {made.trials} trials on tuning seeds{_OF_PLANTS[made.plants]}",
             trials=made.trials,
             knobs={},
             found=made.knobs,

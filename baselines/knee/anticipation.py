@@ -59,7 +59,7 @@ TORQUE_NOISE = 0.4
 """Difference [N m] of the torque in stance from the plan."""
 USUAL_STRETCH = 0.05
 """Stretch [m] whose errors of the tension have the weight 1."""
-KEPT = 60.0
+KEPT = 300.0
 """Time constant [periods] for which the reference keeps its distance from the plan."""
 MISMATCH = 0.1
 """Likelihood that the plan is in stance and the wearer not, or the reverse, at the right shift."""
@@ -78,6 +78,9 @@ KNOBS: Bounds = {"swing": (0.1, 10.0)}
 
 Correction = Callable[[Array], Array]
 """From times of the plan [control periods], (n_env, n_times), to tensions [N]."""
+Inverse = Callable[[Array, RowsState], Array]
+"""From stiffnesses [N/m], (n_env, n_nodes), and the state of the hysteresis when a setpoint takes
+effect, to pressures [Pa]."""
 
 
 class AnticipationState(NamedTuple):
@@ -144,27 +147,40 @@ class KneeAnticipation(RowController):
         return self.answer(observation, self.observed(observation, state))
 
     def answer(
-        self, observation: ArrayLike, now: AnticipationState, more: Correction | None = None
+        self,
+        observation: ArrayLike,
+        now: AnticipationState,
+        more: Correction | None = None,
+        inverse: Inverse | None = None,
     ) -> Prediction:
         """Return the action and the next state after :meth:`observed`.
 
-        ``more`` returns a correction [N] of the tension in stance at times of the plan.
+        ``more`` returns a correction [N] of the tension in stance at times of the plan;
+        ``inverse`` replaces that of the nominal muscle with the estimated gain.
         """
         view, signal = self.observer.read(observation), self.action_signal
         arrival = self.bank.arrival(now.bank)
         later = self.observer.nominal.along(arrival.pressures, now.hysteresis)
         ends = arrival.delay[:, None] + ENDS
         stiffness, weight = self._demands(view, now, ends, more)
-        stiffness = stiffness * (now.moments[:, 0] / now.moments[:, 1])[:, None]
-        held = tuple(np.repeat(part, len(ENDS), axis=0) for part in later)
-        path = self.observer.nominal.pressure_for(stiffness.ravel(), held)
+        path = (inverse or partial(self._inverse, now.moments))(stiffness, later)
         reach = (arrival.rate * self.bank.period)[:, None] * np.array(BLOCKS, float)
         start = arrival.pressures[-1]
-        following = best_path(start, path.reshape(stiffness.shape), weight, reach)[:, 0]
+        following = best_path(start, path, weight, reach)[:, 0]
         command = arrival.set_point(following, self.bank.period)
         command = np.minimum(np.maximum(command, signal.low), signal.high)
         after = now._replace(bank=self.bank.advance(now.bank, command))
         return encode_action(signal, command, observation), after
+
+    def _inverse(self, moments: Array, stiffness: Array, later: RowsState) -> Array:
+        """Return the pressures [Pa] of stiffnesses [N/m] for the gain of the moments."""
+        return self.pressures(stiffness * (moments[:, 0] / moments[:, 1])[:, None], later)
+
+    def pressures(self, stiffness: Array, later: RowsState) -> Array:
+        """Return the nominal muscle's pressures [Pa] of stiffnesses [N/m], (n_env, n_nodes)."""
+        held = tuple(np.repeat(part, stiffness.shape[1], axis=0) for part in later)
+        found = self.observer.nominal.pressure_for(stiffness.ravel(), held)
+        return found.reshape(stiffness.shape)
 
     def _samples(self, observation: ArrayLike) -> Array:
         """Return the previewed channels, shape (n_env, n_channels, n_samples)."""
@@ -207,20 +223,18 @@ class KneeAnticipation(RowController):
         path = ((view.angle_reference[:, None] - angle) / ANGLE_NOISE)[:, None]
         fit = np.exp(-0.5 * np.where(stance[..., None], off, path) ** 2)
         sure = np.where(stance, MISMATCH, MISMATCH * fit[:, 0])[:, None]
-        return np.where((planned == stance)[:, None], fit, sure)
+        slack = self.observer.nominal.free_tension(angle) <= SMALLEST
+        return np.where(((planned | (stance & slack)) == stance)[:, None], fit, sure)
 
     def _demands(
         self, view: KneeView, now: AnticipationState, ends: Array, more: Correction | None
     ) -> tuple[Array, Array]:
         """Return stiffnesses [N/m] and weights at the nodes, shape (n_env, n_nodes)."""
         nominal, plan = self.observer.nominal, now.plan
-        samples, known = self.phase.read(plan, ends)
+        samples, known = self._ahead(plan, ends)
         weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
         if not self.observer.gait:
-            tension = samples[:, 0]
-            stretch = nominal.stretch(nominal.angle_of(tension))
-            stiffness = tension if self.observer.stiffness else tension / stretch
-            return np.maximum(stiffness, 0.0), weight
+            return self._brace_stiffness(now, ends, samples[:, 0]), weight
         tension, angle = samples[:, 0], samples[:, 1]
         here, _ = self.phase.read(plan, np.zeros((len(ends), 1)))
         deviation = view.angle - here[:, 1, 0]
@@ -234,6 +248,17 @@ class KneeAnticipation(RowController):
         stretch = nominal.stretch(angle + deviation[:, None])
         weight = weight * np.where(stance, 1.0, self.swing) * (stretch / USUAL_STRETCH) ** 2
         return np.where(stance, np.maximum(tension, 0.0), free) / stretch, weight
+
+    def _ahead(self, plan: Plan, ends: Array) -> tuple[Array, Rows]:
+        """Return the planned samples after ``ends`` periods, and where they are known."""
+        return self.phase.read(plan, ends)
+
+    def _brace_stiffness(self, now: AnticipationState, ends: Array, reference: Array) -> Array:
+        """Return stiffnesses [N/m] of the brace alone for previewed references."""
+        nominal = self.observer.nominal
+        if self.observer.stiffness:
+            return np.maximum(reference, 0.0)
+        return np.maximum(reference / nominal.stretch(nominal.angle_of(reference)), 0.0)
 
     def _in_stance(self, tension: Array, angle: Array, now: AnticipationState) -> Rows:
         """Return where planned samples are in stance, shape (n_env, n_times)."""

@@ -23,7 +23,7 @@ from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import entry, kernel
 from pam_envs.parameters import declarations
 
-POINTS = {"dead_time": 9, "time_constant": 4, "slew_rate": 6}
+POINTS = {"dead_time": 9, "time_constant": 4, "slew_rate": 11}
 """Candidates over the declared range of each parameter."""
 MEMORY = 500.0
 """Time constant [periods] of the sum of squared deviations."""

@@ -2,7 +2,8 @@
 
 Classical controllers get as many trials as learned ones, by the same sampler, on the same seeds
 (:mod:`agents.search.tune`, :mod:`agents.settings.seeds`), which no score is ever taken from. The
-episodes are those of an environment's nominal track but for the seeds.
+episodes are those of an environment's nominal track but for the seeds, or, on drawn plants, those
+of its randomised track.
 
 The objective is the track's headline, a failed episode at the worst case, averaged over episodes
 and geometrically over kinds of reference, whose errors may differ a hundredfold. A trial that
@@ -32,7 +33,7 @@ from optuna.trial import TrialState
 
 from agents.settings.seeds import MOST_TUNING, tuning
 from baselines.core import catalogue, tuned
-from baselines.core.entry import Bounds, Knobs
+from baselines.core.entry import Bounds, Knobs, Plants
 from baselines.core.tuned import Tuned, tuned_name
 from benchmarks.identity.hashing import digest
 from benchmarks.runs import cells, controllers
@@ -52,6 +53,7 @@ MOST_RATIO = 100.0  # upper limit of the excess of one cost
 STORAGE = controllers.ROOT / "runs" / "tuning.db"
 UNTUNED = "untuned"
 SPLIT = "tuning"
+ENDINGS: Mapping[Plants, str] = {"nominal": "_nominal", "drawn": "_randomised"}  # of tracks
 DIGITS = 4  # significant digits of a factor
 
 
@@ -64,6 +66,7 @@ class Job:
     trials: int = TRIALS  # settings to try, those of earlier calls counted in
     seed: int = 0  # of the sampler
     episodes: int = EPISODES  # of each trial, rounded up to as many for each scenario
+    plants: Plants = "nominal"  # of the episodes
     storage: Path = STORAGE  # SQLite file, which may hold searches of other controllers
 
     @property
@@ -76,6 +79,7 @@ class Job:
         """Command that repeats the search."""
         said = f"python -m benchmarks tune {self.controller} --env {self.env}"
         more = "" if self.episodes == EPISODES else f" --episodes {self.episodes}"
+        more += "" if self.plants == "nominal" else f" --plants {self.plants}"
         return f"{said} --trials {self.trials} --seed {self.seed}{more} --write"
 
 
@@ -99,13 +103,13 @@ def job_of(controller: str, env: str = "", **how: Any) -> Job:
     return job
 
 
-def nominal_track(env: str) -> ScenarioSet:
-    """Return the track of an environment whose plant is the nominal model."""
-    made = (track for track in scenarios.available().values() if track.env == env)
-    found = [track for track in made if track.name.endswith("_nominal")]
+def track_of(env: str, plants: Plants = "nominal") -> ScenarioSet:
+    """Return the track of an environment whose plant is the nominal model, or drawn around it."""
+    made, ending = scenarios.available().values(), ENDINGS[plants]
+    found = [track for track in made if track.env == env and track.name.endswith(ending)]
     if len(found) != 1:
         raise ValueError(
-            f"{env} has {len(found)} tracks named ..._nominal; it needs one to tune on"
+            f"{env} has {len(found)} tracks named ...{ending}; it needs one to tune on"
         )
     return found[0]
 
@@ -214,8 +218,10 @@ def open_study(job: Job) -> optuna.Study:
         sources_digest([controllers.ROOT / "pam_envs"], SOURCES),
     ]
     bounds = {name: list(ends) for name, ends in job.bounds.items()}
-    task = digest([nominal_track(job.env).content, bounds, code])  # excluding results of searches
-    name = f"{tuned_name(job.controller, job.env)}, {job.episodes} episodes, seed {job.seed}"
+    content = track_of(job.env, job.plants).content
+    task = digest([content, bounds, code])  # excluding results of searches
+    entry = tuned_name(job.controller, job.env, job.plants)
+    name = f"{entry}, {job.episodes} episodes, seed {job.seed}"
     study = optuna.create_study(
         storage=RDBStorage(url, engine_kwargs=patience),
         study_name=f"{name}, {task[:12]}",
@@ -248,6 +254,7 @@ def _found(job: Job, study: optuna.Study) -> Tuned:
         before=float(f"{study.user_attrs[UNTUNED]['error']:.6g}"),
         after=float(f"{best.value:.6g}"),
         command=job.command,
+        plants=job.plants,
     )
 
 
@@ -259,6 +266,12 @@ def sentence(found: Tuned) -> str:
     return f"{found.name}: {change}, with {turned}{edge}"
 
 
+def _record(found: Tuned) -> dict[str, Any]:
+    """Return the entry of a result, without the plants if they are nominal."""
+    record = dataclasses.asdict(found)
+    return record if found.plants != "nominal" else {k: record[k] for k in record if k != "plants"}
+
+
 def write(found: Tuned, file: Path = tuned.FILE) -> None:
     """Write the result of a search into the catalogue's file, in place of an older one."""
     with FileLock(file.with_name(f".{file.name}.lock")):
@@ -266,7 +279,7 @@ def write(found: Tuned, file: Path = tuned.FILE) -> None:
         entries = tuned.read(file) | {found.name: found}
         tuned.entries(catalogue.PUBLISHED, entries)  # raises if one is invalid
         head = [line for line in text.splitlines() if line.startswith("#")]
-        plain = {name: dataclasses.asdict(entries[name]) for name in sorted(entries)}
+        plain = {name: _record(entries[name]) for name in sorted(entries)}
         content = {"schema": tuned.SCHEMA, "tuned": plain}
         body = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=1000)
         write_text(file, "\n".join([*head, body]))

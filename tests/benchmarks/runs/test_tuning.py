@@ -113,7 +113,7 @@ def test_higher_cost_is_worse_than_the_published_controller(change, value):
 @pytest.mark.parametrize("name", [n for n in scenarios.names() if n.endswith("_nominal")])
 def test_episodes_are_on_tuning_seeds_each_once(name):
     track = scenarios.available()[name]
-    assert tuning.nominal_track(track.env).name == name
+    assert tuning.track_of(track.env).name == name
     shared = seeds_of(track, 30)
     used = [seed for of_one in shared.values() for seed in of_one]
     assert set(shared) == {scenario.name for scenario in track.scenarios()}
@@ -126,7 +126,7 @@ def test_episodes_are_on_tuning_seeds_each_once(name):
 @pytest.fixture
 def short():
     """The track that positioning is tuned on, two kinds of reference and short."""
-    content = dict(tuning.nominal_track(POSITIONING).content)
+    content = dict(tuning.track_of(POSITIONING).content)
     content |= {"settle_seconds": 0.5, "hold_seconds": 0.2, "per_reference": {}}
     content["kwargs"] = {"episode_seconds": 1.5, "randomize": False}
     content["grid"] = {"reference": ["steps", "sines"], "load": [2.55]}
@@ -160,6 +160,26 @@ def test_tuning_episodes_are_scored_like_the_board_with_knobs_applied(short):
 def test_impossible_search_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         job_of(**arguments)
+
+
+@pytest.mark.parametrize("name", [n for n in scenarios.names() if n.endswith("_randomised")])
+def test_drawn_plants_are_those_of_the_randomised_track(name):
+    assert tuning.track_of(scenarios.available()[name].env, "drawn").name == name
+
+
+def test_search_on_drawn_plants_is_an_entry_of_its_own(tmp_path):
+    nominal = tuning.search(job(tmp_path, trials=2), bowl)
+    drawn = tuning.search(dataclasses.replace(job(tmp_path, trials=2), plants="drawn"), bowl)
+    assert (nominal.name, drawn.name) == ("pid_tuned", "pid_tuned_drawn")
+    assert drawn.command == nominal.command.replace(" --write", " --plants drawn --write")
+    file = tmp_path / "tuned.yaml"
+    file.write_text("schema: 1\ntuned: {}\n")
+    for found in (nominal, drawn):
+        tuning.write(found, file)
+    assert tuned.read(file) == {"pid_tuned": nominal, "pid_tuned_drawn": drawn}
+    assert file.read_text().count("plants: ") == 1
+    made = tuned.entries(PUBLISHED, tuned.read(file))
+    assert made["pid_tuned_drawn"].tuning.endswith("of drawn plants")
 
 
 def test_command_repeats_the_search():
