@@ -61,11 +61,11 @@ TREND = 45.0
 GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
 """Limits of ``a`` and of the width ``b / a``; a wider loop would have no increasing inverse."""
 ADAPTIVE_KNOBS: Bounds = {
-    "swing": (0.03, 10.0),
+    "swing": (0.005, 10.0),
     "observer": (0.2, 5.0),
     "memory": (0.2, 5.0),
     "trend": (0.05, 5.0),
-    "probe": (0.01, 3.0),
+    "probe": (0.01, 10.0),
 }
 
 
