@@ -43,7 +43,7 @@ from baselines.robust.requirements import Kind, robust_controller
 from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 
-KNOBS: Bounds = {"damping": (0.5, 1.5), "disturbance": (0.5, 2.0)}
+KNOBS: Bounds = {"damping": (0.5, 3.0), "disturbance": (0.5, 2.0)}
 """Factors on the damping of the model loop and the bandwidth of the disturbance loop."""
 
 

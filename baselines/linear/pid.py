@@ -29,7 +29,7 @@ DELAY_PERIODS = 1.5
 """Control periods of dead time: hold and computing."""
 FILTER = 8.0
 """Derivative time over the time constant of its filter."""
-PI_KNOBS: Bounds = {"closed_loop_time": (0.1, 4.0), "integral_time": (0.25, 4.0)}
+PI_KNOBS: Bounds = {"closed_loop_time": (0.1, 10.0), "integral_time": (0.25, 4.0)}
 PID_KNOBS: Bounds = {**PI_KNOBS, "derivative_time": (0.25, 16.0)}
 """Factors on ``tau_c``, ``tau_I`` and ``tau_D``."""
 
