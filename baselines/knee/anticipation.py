@@ -73,7 +73,7 @@ USUAL = MEMORY * 100.0**2
 """Moments [N2] of the nominal gain at the start."""
 SMALLEST = 0.5
 """Difference [N] from zero torque that counts as stance."""
-KNOBS: Bounds = {"swing": (0.1, 10.0)}
+KNOBS: Bounds = {"swing": (0.0005, 10.0)}
 
 
 Correction = Callable[[Array], Array]

@@ -31,7 +31,7 @@ GAIN = 0.5
 """Share of an error that is learned: it halves from stride to stride if the inverse is exact."""
 LARGEST = 60.0
 """Largest correction [N], a third of the tension at heel contact."""
-LEARNING_KNOBS: Bounds = {**KNOBS, "learning": (0.2, 3.0)}
+LEARNING_KNOBS: Bounds = {**KNOBS, "learning": (0.002, 3.0)}
 
 
 class RepetitiveState(NamedTuple):

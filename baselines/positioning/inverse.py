@@ -54,7 +54,7 @@ HORIZON = 0.02
 EARLY = 1.6
 """Travel time over remaining time at which a step is started. 2 would centre the transition on the
 first preview sample after the step; the step itself is up to one preview spacing earlier."""
-KNOBS: Bounds = {"horizon": (0.5, 4.0), "lead": (0.5, 2.0), "early": (0.5, 2.0)}
+KNOBS: Bounds = {"horizon": (0.5, 8.0), "lead": (0.5, 4.0), "early": (0.5, 4.0)}
 
 
 class InverseState(NamedTuple):
