@@ -182,7 +182,8 @@ def test_entries_of_the_file_are_in_the_catalogue_with_their_budget():
     for name, found in tuned.read().items():
         entry = CONTROLLERS[name]
         assert (entry.trials, entry.envs) == (found.trials, (found.env,))
-        assert entry.tuning == f"Optuna TPE, {found.trials} trials on tuning seeds"
+        plants = " of drawn plants" if found.plants == "drawn" else ""
+        assert entry.tuning == f"Optuna TPE, {found.trials} trials on tuning seeds{plants}"
         assert found.after <= found.before
 
 
