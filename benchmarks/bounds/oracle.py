@@ -5,17 +5,17 @@ future of the references: it predicts with copies of the environment itself, noi
 no controller, has no place in a ranking, and is never the best: it says which part of an error is
 due to actuation (dead time, rate limit, range), whatever a controller knows.
 
-Every ``APPLIED`` control periods the actions of the next ``horizon`` periods minimise
+After every ``APPLIED`` of a horizon, the actions of the next ``horizon`` control periods minimise
 
     sum of squared errors / scale^2  +  PENALTY * sum of squared changes of the actions
 
-by ``STEPS`` Gauss-Newton steps (nocedal2006). Because predictions are exact, the first ``APPLIED``
-actions of a plan are applied without replanning. The later ones change every ``BLOCK`` periods
-(move blocking). Sensitivities are finite differences: one copy per unknown, its actions raised from
+by ``STEPS`` Gauss-Newton steps (nocedal2006). Because predictions are exact, the actions of a plan
+are applied without replanning in between. Those after them change every ``BLOCK`` periods (move
+blocking). Sensitivities are finite differences: one copy per unknown, its actions raised from
 one period on. The differences are large and their sign alternates, since the thresholds of a
 hysteresis, a rate limit or the end of the range hide a small change or one direction. A step is the
-best of several lengths and dampings, so that the predicted cost never increases. The plan of the
-last period, shifted, is the next starting point.
+best of several lengths and dampings, so that the predicted cost never increases. The last plan,
+shifted, is the next starting point.
 
 Errors that are not scored (outside of the gate of a track, before it has settled) have the weight
 ``UNSCORED``: just enough to keep the plant in its usual range. With a larger weight the oracle
@@ -42,10 +42,10 @@ UNSCORED = 1e-5
 """Weight of a squared error that is not scored."""
 PENALTY = 1e-4
 """Cost of a squared change of a normalised action."""
-APPLIED = 10
-"""Control periods between two plans."""
+APPLIED = 0.1
+"""Time between two plans, relative to the horizon."""
 BLOCK = 2
-"""Control periods between two changes of a plan after the first ``APPLIED``."""
+"""Control periods between two changes of a plan after the actions that are applied."""
 STEPS = 4
 """Gauss-Newton steps a plan."""
 DIFFERENCES = (2e-2, -2e-2)
@@ -91,12 +91,7 @@ class Oracle:
     settle : float
         Time [s] from which the error is scored.
     horizon : int
-        Control periods, at least ``APPLIED``.
-
-    Raises
-    ------
-    ValueError
-        If the horizon is shorter.
+        Control periods.
     """
 
     env: PlantVectorEnv
@@ -108,10 +103,10 @@ class Oracle:
 
     def __post_init__(self) -> None:
         """Make the copies; the first plan holds the setpoints of the start."""
-        if self.horizon < APPLIED:
-            raise ValueError(f"horizon = {self.horizon} must be at least {APPLIED} control periods")
         self.width = len(self.env.action_signals)
-        self._blocks = np.array([*range(APPLIED), *range(APPLIED, self.horizon, BLOCK)])
+        self._applied = max(1, round(APPLIED * self.horizon))
+        blocks = range(self._applied, self.horizon, BLOCK)
+        self._blocks = np.array([*range(self._applied), *blocks])
         raised = np.arange(self.horizon) >= self._blocks[:, None]
         self._raises = np.kron(raised.astype(float), np.eye(self.width))
         self._tangent = Copies(self.env, len(self._raises) + 1)
@@ -131,7 +126,7 @@ class Oracle:
 
     def act(self) -> Array:
         """Return the actions of all environments in their present state, shape (rows, n_act)."""
-        if self._periods % APPLIED == 0:
+        if self._periods % self._applied == 0:
             for k in range(STEPS):
                 self._improve(DIFFERENCES[k % len(DIFFERENCES)])
         self._periods += 1

@@ -5,7 +5,7 @@ import pytest
 
 from baselines.core.catalogue import make_controller
 from benchmarks.bounds.copies import Copies
-from benchmarks.bounds.oracle import Oracle, targets_of
+from benchmarks.bounds.oracle import targets_of
 from benchmarks.bounds.run import play
 from benchmarks.runs.rollout import run
 from benchmarks.scenarios.scenario import ScenarioSet, available
@@ -70,9 +70,3 @@ def test_squares_of_targets_sum_to_square_of_headline(track, score, points):
         for terms in targets_of(content)
     ]
     assert np.sum(np.mean(np.square(errors), axis=1)) / points == pytest.approx(headline**2)
-
-
-def test_horizon_is_at_least_the_periods_between_two_plans():
-    env = make_batch("PAM/MusclePositioning-v0", KWARGS, 1)
-    with pytest.raises(ValueError, match="horizon = 5 must be at least 10"):
-        Oracle(env, 1e-3, horizon=5)
