@@ -19,7 +19,9 @@ shifted, is the next starting point.
 
 Errors that are not scored (outside of the gate of a track, before it has settled) have the weight
 ``UNSCORED``: just enough to keep the plant in its usual range. With a larger weight the oracle
-trades scored against unscored errors: in a gait the muscle is not vented before heel contact.
+trades scored against unscored errors: in a gait the muscle is not vented before heel contact. The
+joints of a redundant arm are held near the posture of the plan with a small weight (``POSTURE``) at
+all times: without it they drift into their limits.
 
 A receding horizon is optimal but for its end, and Gauss-Newton finds a local minimum: the figure is
 an upper bound of the optimum, and with a short horizon other controllers may pass it.
@@ -48,6 +50,8 @@ BLOCK = 2
 """Control periods between two changes of a plan after the actions that are applied."""
 STEPS = 4
 """Gauss-Newton steps a plan."""
+POSTURE = 1e-3
+"""Error [m] of a tool that weighs as much as 1 rad of a joint of a redundant arm."""
 DIFFERENCES = (2e-2, -2e-2)
 """Finite differences of a normalised action, of the steps in turn."""
 DAMPINGS = (0.0, 1e-3, 3e-2)
@@ -72,6 +76,14 @@ def targets_of(content: Mapping[str, Any]) -> tuple[Target, ...]:
         turn = [(f"state/{k}", f"state/reference_{k}", back) for k in DIRECTION]
         return (*((one,) for one in tip), *zip(tip, turn, strict=True))
     return PLAIN
+
+
+def posture_of(keys: Sequence[str]) -> tuple[Target, ...]:
+    """Return the differences of joint angles that hold a redundant arm near its planned posture."""
+    stages = sum(key.startswith("state/joint_reference_") for key in keys)
+    return tuple(
+        ((f"state/angle_{k}", f"state/joint_reference_{k}", POSTURE),) for k in range(stages)
+    )
 
 
 @dataclass
@@ -189,5 +201,10 @@ class Oracle:
         errors = [
             weight * sum(factor * (info[y] - info[r]) for y, r, factor in terms)
             for terms in self.targets
+        ]
+        errors += [
+            factor / self.scale * (info[y] - info[r])
+            for terms in posture_of(self.keys)
+            for y, r, factor in terms
         ]
         return np.concatenate(errors).transpose(1, 2, 0)
