@@ -53,8 +53,8 @@ samples are forgotten no further than to these."""
 ROUGHNESS = 0.01
 """Standard deviation of a sample's stiffness over that of the full pressure."""
 ITERATIONS = 4
-"""Fixed points of the inverse: they leave 1 % of the correction for another width where the slope of
-the loop is that of the line, and up to 6 % at half that slope and half the width."""
+"""Fixed points of the inverse. They leave 1 % of the correction for another width where the slope
+of the loop is that of the line, and up to 6 % at half that slope and half the width."""
 PRESSURE = 0.5e5
 """Height [Pa] of the probe: most regulators reach their rate limit."""
 PROBE, PROBED = (5, 20), 6

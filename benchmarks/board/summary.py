@@ -48,10 +48,12 @@ NEAREST = """\
 The learned controller nearest to a claim in each track, against the best classical one. *P* is the
 probability of improvement; 95 % intervals, the largest ratio of costs, and what is missing to
 *better* in brackets."""
-AUDITED = "audit episodes, whose seeds were drawn after every controller had been committed"
+AUDITED = """\
+audit episodes, whose seeds were drawn
+after every controller had been committed"""
 EXCERPT = """\
-Nine environments, {count}, scored on {episodes}. RMS error on the nominal plant / on
-plants with drawn parameters:
+Nine environments, {count}, scored on {episodes}.
+RMS error on the nominal plant / on plants with drawn parameters:
 """
 RANK_CHANGES = """\
 Each track against the nominal one of its environment, among the controllers that have run in all
@@ -116,10 +118,16 @@ def best_of(track: str, rows: Sequence[Row], bounds: Mapping[str, Bounds]) -> Be
         track,
         gap.best(rows, gap.is_as_published),
         claims.best_classical(rows),
-        next((row for row in standings.ordered(rows) if not views.is_classical(row)), None),
+        best_learned(rows),
         made[0] if made else None,
         known,
     )
+
+
+def best_learned(rows: Sequence[Row]) -> Row | None:
+    """Return the learned row with the lowest mean, of those with a rank if there is one."""
+    learned = [row for row in standings.ordered(rows) if not views.is_classical(row)]
+    return next(iter([*filter(views.is_listed, learned), *learned]), None)
 
 
 def nominal(tracks: Tracks, bounds: Mapping[str, Bounds] = NO_BOUNDS) -> dict[str, Best]:

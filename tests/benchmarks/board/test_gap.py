@@ -148,18 +148,7 @@ def test_written_bounds_are_read_back_beside_earlier_ones(tmp_path):
     assert bounding.read(tmp_path) == {"a": first, "b": second}
 
 
-@pytest.mark.parametrize(
-    "env",
-    [
-        pytest.param(
-            name,
-            marks=pytest.mark.xfail(reason="no bound of the arm yet", strict=True)
-            if name == "PAM/RedundantManipulator-v0"
-            else (),
-        )
-        for name in NAMES
-    ],
-)
+@pytest.mark.parametrize("env", NAMES)
 def test_every_environment_has_a_valid_bound_and_a_reason_below_60_per_cent(env):
     made = scenarios.available().values()
     (track,) = (t.name for t in made if t.env == env and t.name.endswith("_nominal"))
