@@ -364,7 +364,7 @@ def papers(
 def bound(
     track: Positional[tuple[str, ...]],
     episodes: int = 2,
-    horizon: int = 60,
+    horizon: int = 100,
     write: bool = False,
 ) -> int:
     """Estimate the smallest error of tracks: a controller that knows plant, state and future.

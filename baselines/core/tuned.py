@@ -35,7 +35,7 @@ class Tuned:
     before, after : float
         Objective with all knobs at 1 and with these [SI]; lower is better.
     command : str
-        Command that repeats the search.
+        Command that repeats the search, in the search space of the present catalogue.
     plants : {"nominal", "drawn"}
         Plants of the search's episodes; not written if nominal.
     """

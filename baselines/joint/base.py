@@ -25,7 +25,7 @@ and joints. Signals are named ``angle``, ``set_point``, ``reference`` for one jo
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -183,18 +183,13 @@ class Gravity:
 
     @cached_property
     def _table(self) -> Array:
-        """Shifts by angle and torque, kept by plant."""
-        key = self.plant.digest()
-        if key not in _TABLES:
-            _TABLES[key] = _table_of(self.plant)
-        return _TABLES[key]
+        """Shifts by angle and torque."""
+        return _table_of(self.plant)
 
 
-_TABLES: dict[str, Array] = {}
-
-
+@lru_cache(maxsize=32)
 def _table_of(plant: Any) -> Array:
-    """Return the shifts [rad] by angle and torque, shape (ANGLES, TORQUES)."""
+    """Return the shifts [rad] by angle and torque, shape (ANGLES, TORQUES); not to be changed."""
     low, high = plant.angle_range
     angle = np.linspace(low, high, ANGLES)[:, None]
     torque = np.linspace(-LARGEST_TORQUE, LARGEST_TORQUE, TORQUES)[None, :]

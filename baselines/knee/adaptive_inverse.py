@@ -8,16 +8,18 @@ gain ``a`` is linear in ``a`` and ``b = a w``:
 
 ``L`` is the line of the operator's total slope and ``d`` the disturbance [N/m]: what two numbers
 do not describe, such as a loop of another form. Recursive least squares with forgetting estimate
-``a`` and ``b`` from sensed tension and angle; a first-order lag filters the remaining difference to
-``d``. The pressure is that of the regulator's model, so that neither estimate contains a dead time.
+``a`` and ``b`` from sensed tension and angle as if ``d`` were 0, all samples with equal weight; a
+first-order lag filters the remaining difference to ``d``. The pressure is that of the regulator's
+model, so that neither estimate contains a dead time.
 
 The inverse solves ``H(p) = v`` with ``v = (s - d) / a + (1 - b / a) (v - L(p))`` by relaxed fixed
-points. The brace alone bends with the delay ``c / k`` of its damping and stiffness; the stretch of
-a planned tension is that of the angle delayed, moved by the difference of the sensed angle.
+points. The brace alone follows its tension with a lag, here the delay ``c / k`` of its damping and
+stiffness; the stretch of a planned tension is that of the angle delayed, moved by the difference of
+the sensed angle.
 
 In a gait the regulator is at rest until the first stance, so that nothing shows its rate limit. A
 small probe in a first swing, where the tension is not tracked, lets the bank of regulators choose.
-Beyond the preview an unknown stride goes on with the last trend.
+Beyond the preview the tension of an unknown stride goes on with the last trend, the angle does not.
 """
 
 import math
@@ -51,9 +53,10 @@ samples are forgotten no further than to these."""
 ROUGHNESS = 0.01
 """Standard deviation of a sample's stiffness over that of the full pressure."""
 ITERATIONS = 4
-"""Fixed points of the inverse: they leave 1 % of the correction for another width."""
+"""Fixed points of the inverse. They leave 1 % of the correction for another width where the slope
+of the loop is that of the line, and up to 6 % at half that slope and half the width."""
 PRESSURE = 0.5e5
-"""Height [Pa] of the probe: beyond the rate limit of most regulators."""
+"""Height [Pa] of the probe: most regulators reach their rate limit."""
 PROBE, PROBED = (5, 20), 6
 """Begin and end [periods] of the probe, and the nodes of the horizon that it moves."""
 TREND = 45.0
@@ -86,7 +89,7 @@ class AdaptiveState(NamedTuple):
 class TrendAnticipation(KneeAnticipation):
     """Anticipating inverse with a bending brace, or with the trend of an unknown stride.
 
-    The offset of the brace alone is that of its angle from the plan [rad].
+    The offset of a brace whose tension is controlled is that of its angle from the plan [rad].
 
     Attributes
     ----------
@@ -105,7 +108,7 @@ class TrendAnticipation(KneeAnticipation):
     def observed(self, observation: ArrayLike, state: AnticipationState) -> AnticipationState:
         """Return the state with what an observation shows of plan, brace and plant."""
         now = super().observed(observation, state)
-        if self.observer.gait:
+        if self.observer.gait or self.observer.stiffness:
             return now
         planned = self._angles(now, np.zeros((len(now.offset), 1)))[:, 0]
         off = self.observer.read(observation).angle - planned

@@ -56,9 +56,11 @@ def _matched(row: Row, rows: Sequence[Row], rival: Row) -> list[str]:
     if not views.preview_of(row) or views.preview_of(rival):
         return []
     other = best_classical([one for one in rows if views.preview_of(one)])
-    found = None if other is None else standings.improvement(row, other)
-    if other is None or found is None:
+    if other is None:
         return [f"uses {views.preview_of(row):g} s of preview, no classical controller does"]
+    found = standings.improvement(row, other)
+    if found is None:
+        return [f"has not run the episodes of {views.name_of(other)}, which uses preview as well"]
     if found.value > PROBABILITY and found.low > LOWER_BOUND:
         return []
     return [f"P {found.value:.2f} against {views.name_of(other)}, which uses preview as well"]

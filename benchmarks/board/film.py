@@ -87,8 +87,9 @@ def sides(track: ScenarioSet, best: Best, scenario: Scenario) -> Iterator[tuple[
     for name, side in seen.items():
         entrant = controllers.find(name)
         model = model_of(track.env, scenario, env)
-        made = controllers.make(entrant, model, env, training_seed=entrant.training_seeds[0])
-        yield side, name, made
+        seed = entrant.training_seeds[0]
+        made = controllers.make(entrant, model, env, training_seed=seed)
+        yield side, name if seed is None else f"{name}, training seed {seed}", made
     env.close()
 
 

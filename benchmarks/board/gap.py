@@ -43,8 +43,9 @@ future reference ([controllers](../../docs/controllers.md#estimate-of-the-smalle
 no rank. The *paper's controller* of a track is the best one as published or by a textbook rule,
 without preview and without tuning. *Best classical* is the best controller that is built from the
 nominal model, tuned or not. *Closed* is (paper - best) / (paper - oracle), with its 95 % interval
-(episodes resampled within scenarios). *Travel* is the pressure travel of the best controller
-relative to the paper's. All means of a line are over the same public episodes, those of the oracle.
+(episodes resampled within scenarios; too narrow with two episodes of a scenario). *Travel* is the
+pressure travel of the best controller relative to the paper's. All means of a line are over the
+same public episodes, those of the oracle.
 """
 MATCHED = """\
 The best classical controllers that use no preview, and those that use it (as measured, see the

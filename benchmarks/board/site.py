@@ -218,7 +218,7 @@ def _winner(found: board_summary.Best) -> dict[str, Any]:
         "rival": views.name_of(rival) if rival else "none",
         "rival_scores": words.scores_by_title(rival, found.split),
         "learned": views.name_of(entry.row) if entry else "none",
-        "learned_scores": words.scores_by_title(found.learned, found.split),
+        "learned_scores": words.scores_by_title(entry.row if entry else None, found.split),
         "chance": _numbers(entry.probability) if entry else None,
         "gain": percent(entry.gain) if entry else "-",
         "cost": words.largest_cost(entry) if entry else "-",

@@ -40,16 +40,20 @@ interactive page with trajectories.
 BEST = """\
 RMS with its 95 % interval, *EMG effort* of the gait environments, and the share of episodes that
 reached their end if some did not. *Paper's controller*: the best one as published or by a textbook
-rule, without preview and without tuning. *Best classical*: tuned or not. *Oracle*: a predictive
-controller with the true plant, on fewer episodes ([distance from it](leaderboard/gap.md)).
+rule, without preview and without tuning. *Best classical*: tuned or not. *Best learned*: mean over
+its training seeds. *Oracle*: a predictive controller with the true plant, on the first public
+episodes of each scenario ([distance from it](leaderboard/gap.md)).
 """
 NEAREST = """\
 The learned controller nearest to a claim in each track, against the best classical one. *P* is the
 probability of improvement; 95 % intervals, the largest ratio of costs, and what is missing to
 *better* in brackets."""
+AUDITED = """\
+audit episodes, whose seeds were drawn
+after every controller had been committed"""
 EXCERPT = """\
-Nine environments, {count}, all scored on audit episodes: their seeds were drawn after every
-controller had been committed. RMS error on the nominal plant / on plants with drawn parameters:
+Nine environments, {count}, scored on {episodes}.
+RMS error on the nominal plant / on plants with drawn parameters:
 """
 RANK_CHANGES = """\
 Each track against the nominal one of its environment, among the controllers that have run in all
@@ -74,6 +78,8 @@ class Best:
         Row of the best controller as published, without preview and without tuning.
     classical : dict, optional
         Row of the best classical controller with a source.
+    learned : dict, optional
+        Row of the learned controller with the lowest mean.
     claim : Claim, optional
         Of the learned controller nearest to a claim, against the classical one.
     oracle : Bounds, optional
@@ -84,6 +90,7 @@ class Best:
     track: str
     paper: Row | None
     classical: Row | None
+    learned: Row | None
     claim: Claim | None
     oracle: Bounds | None
 
@@ -93,11 +100,6 @@ class Best:
         if self.claim is not None:
             return self.claim.split
         return "" if self.classical is None else views.published_split(self.classical)
-
-    @property
-    def learned(self) -> Row | None:
-        """The learned controller of the claim."""
-        return None if self.claim is None else self.claim.row
 
     @property
     def silence(self) -> str:
@@ -116,9 +118,16 @@ def best_of(track: str, rows: Sequence[Row], bounds: Mapping[str, Bounds]) -> Be
         track,
         gap.best(rows, gap.is_as_published),
         claims.best_classical(rows),
+        best_learned(rows),
         made[0] if made else None,
         known,
     )
+
+
+def best_learned(rows: Sequence[Row]) -> Row | None:
+    """Return the learned row with the lowest mean, of those with a rank if there is one."""
+    learned = [row for row in standings.ordered(rows) if not views.is_classical(row)]
+    return next(iter([*filter(views.is_listed, learned), *learned]), None)
 
 
 def nominal(tracks: Tracks, bounds: Mapping[str, Bounds] = NO_BOUNDS) -> dict[str, Best]:
@@ -225,7 +234,9 @@ def excerpt(all_rows: Sequence[Row], bounds: Mapping[str, Bounds] = NO_BOUNDS) -
         ]
         lines.append([f"`{short_env(found[0].env)}`", views.unit_of(tracks[name][0])[0], *cells])
     count = f"{len(tracks)} tracks and {len(all_rows)} rows"
-    return "\n".join([EXCERPT.format(count=count), *table(["environment", "unit", *SIDES], lines)])
+    audited = all(map(views.is_audited, all_rows))
+    words = {"count": count, "episodes": AUDITED if audited else "public episodes"}
+    return "\n".join([EXCERPT.format(**words), *table(["environment", "unit", *SIDES], lines)])
 
 
 def _short(best: Best) -> list[str]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from filelock import FileLock
 
-from benchmarks.bounds.oracle import PLAIN, TARGETS, Oracle
+from benchmarks.bounds.oracle import Oracle, targets_of
 from benchmarks.identity import tasks
 from benchmarks.runs.rollout import Episode
 from benchmarks.runs.rows import RESULTS
@@ -24,8 +24,8 @@ from pam_envs.arrays import Array
 
 EPISODES = 2
 """Episodes of each scenario: an interval needs the scatter within one."""
-HORIZON = 60
-"""Control periods: dead time, and a travel of 0.5 s at the rate limit."""
+HORIZON = 100
+"""Control periods: dead time, a travel of 0.5 s at the rate limit, and the swing before it."""
 FILE = "oracle.json.xz"
 """Beside the rows: the bounds of each track."""
 SCHEMA = 1
@@ -100,8 +100,9 @@ def play(
     oracle = Oracle(
         env,
         1.0 / shown(content)[1],
-        TARGETS.get(headline_of(content), PLAIN),
+        targets_of(content),
         tuple(content.get("gate") or ()),
+        float(content["settle_seconds"]),
         horizon,
     )
     oracle.start(_held(env, observation))

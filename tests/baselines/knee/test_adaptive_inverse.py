@@ -1,4 +1,4 @@
-"""Adaptive inverse of the knee: estimates of gain and loop width, inverse, bending, rows."""
+"""Adaptive inverse of the knee: estimates of gain and loop width, inverse, probe, trend, rows."""
 
 import dataclasses
 
@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from baselines.core.entry import Spec
-from baselines.knee.adaptive_inverse import BEFORE, AdaptiveState, make_knee_adaptive_inverse
+from baselines.knee.adaptive_inverse import (
+    BEFORE,
+    PROBE,
+    AdaptiveState,
+    make_knee_adaptive_inverse,
+)
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from tests.baselines.conftest import built, make_env, rms, rollout
 
@@ -74,3 +79,60 @@ def test_forgetting_ends_at_the_variances_before_the_first_sample():
         state = hasty._estimated(observation, state)
     assert (state.covariance[0, :2] <= BEFORE[:2] * (1.0 + 1e-12)).all()
     assert np.isfinite(state.estimate).all()
+
+
+def test_probe_moves_the_setpoint_in_a_first_swing_alone():
+    env = make_env("PAM/KneeWalk-v0")
+    quiet, loud = (built("knee_adaptive_inverse", env, probe=p) for p in (0.01, 3.0))
+    probed = []
+    for seed in range(6):
+        observation, _ = env.reset(seed=seed)
+        state = None
+        for step in range(40):
+            stance = bool(quiet.forward.observer.read(observation).stance[0])
+            action, after = quiet.predict(observation, state, state is None)
+            if abs(loud.predict(observation, state, state is None)[0] - action).max() > 1e-3:
+                probed.append((step, stance))
+            state = after  # estimates that no probe has changed
+            observation, *_ = env.step(action)
+    assert probed
+    assert all(PROBE[0] <= step < PROBE[1] and not stance for step, stance in probed)
+
+
+def test_tension_beyond_the_preview_goes_on_with_the_trend():
+    env = make_env("PAM/KneeWalk-v0")
+    forward = built("knee_adaptive_inverse", env).forward
+    ends, most, steps = np.arange(1.0, 120.0)[None], 0.0, np.ones(1)
+    for seed in range(4):
+        observation, _ = env.reset(seed=seed)
+        state = forward.initial_state(observation)
+        for _ in range(40):
+            state = forward.observed(observation, state)
+            samples, known = forward._ahead(state.plan, ends)
+            held, _ = forward.phase.read(state.plan, ends)
+            assert np.array_equal(samples[:, 0][known], held[:, 0][known])
+            assert np.array_equal(samples[:, 1], held[:, 1])
+            more = abs(samples[:, 0] - held[:, 0])[~known]
+            if more.max(initial=0.0) > max(most, 1.0):
+                most, steps = more.max(), np.diff(more)
+            observation, *_ = env.step(env.action_space.low)
+    assert most > 1.0
+    assert abs(steps[-1]) < 0.5 * abs(steps[0])  # the trend fades
+
+
+def test_row_of_a_batch_is_the_single_episode():
+    env = make_env("PAM/KneeWalk-v0")
+    controller = built("knee_adaptive_inverse", env)
+    seen = []
+    for seed in (1, 2):
+        observation, _ = env.reset(seed=seed)
+        seen.append([observation])
+        for _ in range(60):
+            observation, *_ = env.step(env.action_space.high)
+            seen[-1].append(observation)
+    alone, together, state = None, None, [None, None]
+    for pair in zip(*seen, strict=True):
+        together, both = controller.predict(np.array(pair), state[0], state[0] is None)
+        alone, one = controller.predict(pair[1], state[1], state[1] is None)
+        state = [both, one]
+        assert np.array_equal(together[1], alone)

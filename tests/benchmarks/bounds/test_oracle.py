@@ -1,14 +1,19 @@
 """Oracle: copies of environments, and a bound that controllers do not pass."""
 
 import numpy as np
+import pytest
 
 from baselines.core.catalogue import make_controller
 from benchmarks.bounds.copies import Copies
+from benchmarks.bounds.oracle import targets_of
 from benchmarks.bounds.run import play
 from benchmarks.runs.rollout import run
 from benchmarks.scenarios.scenario import ScenarioSet, available
 from benchmarks.scenarios.scenario_env import make_batch, make_env
-from benchmarks.scoring.metrics import scores_of
+from benchmarks.scoring.group import Record
+from benchmarks.scoring.groups.elbow import of_elbow
+from benchmarks.scoring.groups.joint import DIRECTION, POSITION, of_chain
+from benchmarks.scoring.metrics import headline_of, scores_of
 
 KWARGS = {"reference": "steps", "load": 2.55, "episode_seconds": 5.0}
 
@@ -43,3 +48,25 @@ def test_no_controller_passes_the_bound_of_the_oracle():
             found = scores_of(run(env, made, seed), track.content, scenario.rests)["rms_error"]
             least = scores_of(best, track.content, scenario.rests)["rms_error"]
             assert least < 1.02 * found
+
+
+@pytest.mark.parametrize(
+    ("track", "score", "points"),
+    [("manipulator_nominal", of_chain, 2), ("elbow_nominal", of_elbow, 1)],
+)
+def test_squares_of_targets_sum_to_square_of_headline(track, score, points):
+    content = available()[track].content
+    names = [f"state/{r}{k}" for r in ("", "reference_") for k in (*POSITION, *DIRECTION)]
+    names += ["output", "reference", "saturated", "state/pointing_error", "state/joint_error"]
+    names += ["state/stiffness", "state/stiffness_reference", "state/torque_clipped"]
+    names += ["state/stiffness_clipped", "state/felt", "state/object_torque", "state/object"]
+    names += ["state/slack", "state/angle_0", "state/joint_reference_0", "effort/switchings"]
+    samples = np.random.default_rng(0).normal(size=(len(names), 50))
+    signals = dict(zip(names, samples, strict=True))
+    window = np.ones(50, bool)
+    headline = score(Record(signals, window, window, 0.01, content))[headline_of(content)]
+    errors = [
+        sum(factor * (signals[y] - signals[r]) for y, r, factor in terms)
+        for terms in targets_of(content)
+    ]
+    assert np.sum(np.mean(np.square(errors), axis=1)) / points == pytest.approx(headline**2)
