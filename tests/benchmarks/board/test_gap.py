@@ -17,6 +17,7 @@ from benchmarks.bounds import run as bounding
 from benchmarks.bounds.run import Bound, Bounds
 from benchmarks.runs import rows
 from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scoring.metrics import headline_of
 
 NAMES = sorted({track.env for track in scenarios.available().values()})
 PAGE = Path(__file__).parents[3] / "docs" / "controllers.md"
@@ -156,3 +157,15 @@ def test_every_environment_has_a_valid_bound_and_a_reason_below_60_per_cent(env)
     found = gap.gap_of_best(held, bounding.read().get(track))
     assert found is not None
     assert found.closed.value >= gap.ENOUGH or gap.reasons().get(short_env(env))
+
+
+def test_no_controller_has_a_smaller_mean_than_the_oracle_on_the_same_episodes():
+    better = []
+    nominal = {name: b for name, b in bounding.read().items() if name.endswith("_nominal")}
+    for track, bounds in nominal.items():
+        for row in (rows.load(path) for path in rows.files() if path.parent.name == track):
+            headline = headline_of(views.content_of(row))
+            least = np.mean([episode.scores[headline] for episode in bounds.episodes])
+            if gap._scores(row, headline, bounds).mean() < least:
+                better.append(row["row"])
+    assert better == []
