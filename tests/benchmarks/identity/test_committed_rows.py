@@ -33,9 +33,7 @@ def test_every_controller_has_a_verified_row(committed):
     assert names - found == set()
 
 
-@pytest.mark.xfail(
-    reason="verify --all has not reached all rows", strict=True
-)
+@pytest.mark.xfail(reason="verify --all has not reached all rows", strict=True)
 def test_every_row_is_verified(committed):
     noted = verified.read(rows.RESULTS)
     assert [row["row"] for row in committed if not verified.of(row, noted)] == []
