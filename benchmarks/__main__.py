@@ -316,7 +316,7 @@ def tune(
         trials: Number of settings to try, including those of earlier calls.
         seed: Seed of the sampler.
         episodes: Minimum number of episodes per trial.
-        plants: Episodes of the nominal track, or of the randomised one, whose plants are drawn.
+        plants: Episodes of the nominal track, or of the one whose plants are drawn.
         write: Write the result into baselines/core/tuned.yaml, which the catalogue reads.
         storage: SQLite file of the trials, runs/tuning.db by default.
     """

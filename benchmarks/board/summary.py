@@ -62,8 +62,8 @@ order.
 """
 
 
-KINDS = ("nominal", "randomised", "wrong_model", "everyday")
-"""Endings of the tracks of the first table."""
+KINDS = ("nominal", "random", "wrong_model", "everyday")
+"""Parts of the names of the tracks in the first table."""
 SIDES = ("paper's controller", "best classical", "best learned", "oracle")
 """Columns of the first table."""
 
@@ -161,8 +161,10 @@ def _best_controllers(found: Mapping[str, Best]) -> list[str]:
     lines = []
     for kind in KINDS:
         for name, best in found.items():
-            if name.endswith(f"_{kind}"):
-                where = f"`{short_env(best.env)}`<br>{kind.replace('_', ' ')}"
+            _, found_kind, tail = name.partition(f"_{kind}")
+            if found_kind:
+                words = f"{kind}{tail}".replace("_", " ")
+                where = f"`{short_env(best.env)}`<br>{words}"
                 rows = (best.paper, best.classical, best.learned)
                 lines.append([where, *map(_scores, rows), _bound(best)])
     if not lines:
@@ -224,9 +226,11 @@ def excerpt(all_rows: Sequence[Row], bounds: Mapping[str, Bounds] = NO_BOUNDS) -
     """Return the table of README: RMS on the nominal tracks and on those with drawn plants."""
     tracks, lines = standings.tracks(all_rows), []
     for name in tracks:
-        pair = [name, name.replace("_nominal", "_randomised")]
-        if pair[0] == pair[1] or not all(one in tracks for one in pair):
+        head, nominal_track, _ = name.partition("_nominal")
+        drawn = next((one for one in tracks if one.startswith(f"{head}_random")), None)
+        if not nominal_track or drawn is None:
             continue
+        pair = [name, drawn]
         found = [best_of(one, tracks[one], bounds) for one in pair]
         cells = [
             "-" if set(both) == {"-"} else " / ".join(both)

@@ -3,7 +3,7 @@
 Classical controllers get as many trials as learned ones, by the same sampler, on the same seeds
 (:mod:`agents.search.tune`, :mod:`agents.settings.seeds`), which no score is ever taken from. The
 episodes are those of an environment's nominal track but for the seeds, or, on drawn plants, those
-of its randomised track.
+of its track with drawn plants.
 
 The objective is the track's headline, a failed episode at the worst case, averaged over episodes
 and geometrically over kinds of reference, whose errors may differ a hundredfold. A trial that
@@ -53,7 +53,7 @@ MOST_RATIO = 100.0  # upper limit of the excess of one cost
 STORAGE = controllers.ROOT / "runs" / "tuning.db"
 UNTUNED = "untuned"
 SPLIT = "tuning"
-ENDINGS: Mapping[Plants, str] = {"nominal": "_nominal", "drawn": "_randomised"}  # of tracks
+PARTS: Mapping[Plants, str] = {"nominal": "_nominal", "drawn": "_random"}  # of names of tracks
 DIGITS = 4  # significant digits of a factor
 
 
@@ -105,11 +105,11 @@ def job_of(controller: str, env: str = "", **how: Any) -> Job:
 
 def track_of(env: str, plants: Plants = "nominal") -> ScenarioSet:
     """Return the track of an environment whose plant is the nominal model, or drawn around it."""
-    made, ending = scenarios.available().values(), ENDINGS[plants]
-    found = [track for track in made if track.env == env and track.name.endswith(ending)]
+    made, part = scenarios.available().values(), PARTS[plants]
+    found = [track for track in made if track.env == env and part in track.name]
     if len(found) != 1:
         raise ValueError(
-            f"{env} has {len(found)} tracks named ...{ending}; it needs one to tune on"
+            f"{env} has {len(found)} tracks named ...{part}...; it needs one to tune on"
         )
     return found[0]
 
