@@ -130,10 +130,10 @@ def best_learned(rows: Sequence[Row]) -> Row | None:
     return next(iter([*filter(views.is_listed, learned), *learned]), None)
 
 
-def nominal(tracks: Tracks, bounds: Mapping[str, Bounds] = NO_BOUNDS) -> dict[str, Best]:
+def nominal(tracks: Tracks) -> dict[str, Best]:
     """Return the best of each environment's nominal track (of all tracks if none is nominal)."""
     chosen = {name: rows for name, rows in tracks.items() if "nominal" in name} or dict(tracks)
-    return {name: best_of(name, rows, bounds) for name, rows in chosen.items()}
+    return {name: best_of(name, rows, NO_BOUNDS) for name, rows in chosen.items()}
 
 
 def board_text(
