@@ -21,6 +21,8 @@ from pam_envs.pneumatics.regulator import JointRegulator
 STEP = 1e-6
 SMALLEST_TORQUE = 1e-9
 SMALLEST_ARM = 1e-12
+ROUNDING = 1e-9
+"""Torque [N m] by which the largest bearable payload may seem too heavy."""
 PRESTRESS_RANGE = (20.0, 120.0)
 """Co-contractions [N] that the preset takes: more and the buckling lever leaves no stiffness."""
 
@@ -241,7 +243,7 @@ def check_borne(
     needed_torque = plant.weight_torque(angles, payload)
     short = np.maximum(needed_torque - high, low - needed_torque)
     pose, joint = np.unravel_index(int(np.argmax(short)), short.shape)
-    if short[pose, joint] <= 0.0:
+    if short[pose, joint] <= ROUNDING:
         return
     needed = float(needed_torque[pose, joint])
     there = float((high if needed > high[pose, joint] else low)[pose, joint])

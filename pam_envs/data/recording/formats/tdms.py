@@ -30,7 +30,8 @@ def open_tdms(path: Path) -> Iterator["TdmsLog"]:
         from nptdms import TdmsFile
     except ImportError as error:
         raise missing_package(str(path), KIND, "npTDMS") from error
-    with failures_named(str(path), KIND), TdmsFile.open(path) as file:
+    # TdmsFile.open(path) would leave the file open where it fails.
+    with failures_named(str(path), KIND), path.open("rb") as raw, TdmsFile.open(raw) as file:
         yield TdmsLog(file)
 
 
