@@ -63,12 +63,11 @@ TREND = 45.0
 """Time constant [periods] with which the trend of an unknown stride fades."""
 GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
 """Limits of ``a`` and of the width ``b / a``; a wider loop would have no increasing inverse."""
-ADAPTIVE_KNOBS: Bounds = {
-    "swing": (0.005, 10.0),
+KNOBS: Bounds = {
     "observer": (0.2, 5.0),
     "memory": (0.2, 5.0),
     "trend": (0.05, 5.0),
-    "probe": (0.01, 10.0),
+    "probe": (0.01, 20.0),
 }
 
 
@@ -240,6 +239,6 @@ ENTRIES = {
         make=make_knee_adaptive_inverse,
         feedback=True,
         citation="yeh2010; bertsekas2017; thrun2005; magill1965; ohnishi1996",
-        knobs=ADAPTIVE_KNOBS,
+        knobs=KNOBS,
     ),
 }

@@ -36,7 +36,7 @@ from baselines.core.controller import (
     preview_names,
     reader,
 )
-from baselines.core.entry import KNEE, Bounds, Entry, Spec
+from baselines.core.entry import KNEE, Entry, Spec
 from baselines.knee.nominal import KneeObserver, KneeView, make_knee_observer
 from baselines.knee.plan import SCALES, PhaseFilter, Plan
 from baselines.predictive.preview import PreviewMemory
@@ -47,8 +47,8 @@ from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.parameters import Signal
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
-SWING = 0.02
-"""Weight of a squared error of the tension in swing over that in stance."""
+SWING = 0.001
+"""Weight of a squared error of the tension in swing, which is not tracked, over that in stance."""
 UNKNOWN = 0.3
 """Weight of samples that are neither previewed nor remembered."""
 BLOCKS = (1,) * 8 + (2,) * 6 + (4,) * 10
@@ -73,7 +73,6 @@ USUAL = MEMORY * 100.0**2
 """Moments [N2] of the nominal gain at the start."""
 SMALLEST = 0.5
 """Difference [N] from zero torque that counts as stance."""
-KNOBS: Bounds = {"swing": (0.0005, 10.0)}
 
 
 Correction = Callable[[Array], Array]
@@ -115,8 +114,6 @@ class KneeAnticipation(RowController):
         Reader of the sensed pressure.
     bank : RegulatorBank
         Candidates of the regulator, or the nominal one.
-    swing : float
-        Weight of a squared error in swing over that in stance.
     adaptive : bool
         Whether regulator and gain are estimated.
     """
@@ -127,7 +124,6 @@ class KneeAnticipation(RowController):
     torque: Reader | None
     pressure: Reader
     bank: RegulatorBank
-    swing: float
     adaptive: bool
     action_signal: Signal
 
@@ -239,15 +235,26 @@ class KneeAnticipation(RowController):
         here, _ = self.phase.read(plan, np.zeros((len(ends), 1)))
         deviation = view.angle - here[:, 1, 0]
         free = nominal.free_tension(angle)
-        stance = self._in_stance(tension, angle, now)
+        stance = self._wholly_in_stance(plan, ends, now)
         together = view.stance & self._in_stance(here[:, 0], here[:, 1], now)[:, 0]
         excess = np.where(together, view.reference - here[:, 0, 0], 0.0)
         tension = tension + excess[:, None] * np.exp(-ends / KEPT)
         if more is not None:
             tension = tension + more(self.phase.present(plan)[:, None] + ends)
         stretch = nominal.stretch(angle + deviation[:, None])
-        weight = weight * np.where(stance, 1.0, self.swing) * (stretch / USUAL_STRETCH) ** 2
+        weight = weight * np.where(stance, 1.0, SWING) * (stretch / USUAL_STRETCH) ** 2
         return np.where(stance, np.maximum(tension, 0.0), free) / stretch, weight
+
+    def _wholly_in_stance(self, plan: Plan, ends: Array, now: AnticipationState) -> Rows:
+        """Return where the samples before and after a node are in stance, shape (n_env, n_nodes).
+
+        The tension that is interpolated between stance and swing is that of neither.
+        """
+        present = self.phase.present(plan)[:, None]
+        times = present + ends
+        around = [self._ahead(plan, whole(times) - present)[0] for whole in (np.floor, np.ceil)]
+        before, after = (self._in_stance(part[:, 0], part[:, 1], now) for part in around)
+        return before & after
 
     def _ahead(self, plan: Plan, ends: Array) -> tuple[Array, Rows]:
         """Return the planned samples after ``ends`` periods, and where they are known."""
@@ -283,7 +290,6 @@ def make_knee_anticipation(spec: Spec[KneeOrthosis], adaptive: bool = False) -> 
         reader(signals, ["torque_reference"]) if gait else None,
         reader(signals, ["pressure"]),
         RegulatorBank.make(plant, adaptive),
-        spec.knob("swing") * SWING,
         adaptive,
         spec.actions["pressure_set_point"],
     )
@@ -296,7 +302,6 @@ ANTICIPATION = partial(
     citation="yeh2010; bertsekas2017; thrun2005",
     envs=KNEE,
     plants=(KneeOrthosis,),
-    knobs=KNOBS,
 )
 ENTRIES = {
     "knee_anticipating": ANTICIPATION(

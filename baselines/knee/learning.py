@@ -18,7 +18,6 @@ from baselines.core.controller import Prediction, RowController
 from baselines.core.entry import GAIT, Bounds, Spec
 from baselines.knee.anticipation import (
     ANTICIPATION,
-    KNOBS,
     AnticipationState,
     KneeAnticipation,
     make_knee_anticipation,
@@ -31,7 +30,7 @@ GAIN = 0.5
 """Share of an error that is learned: it halves from stride to stride if the inverse is exact."""
 LARGEST = 60.0
 """Largest correction [N], a third of the tension at heel contact."""
-LEARNING_KNOBS: Bounds = {**KNOBS, "learning": (0.002, 3.0)}
+KNOBS: Bounds = {"learning": (0.002, 3.0)}
 
 
 class RepetitiveState(NamedTuple):
@@ -78,6 +77,6 @@ ENTRIES = {
         feedback=True,
         citation="yeh2010; bertsekas2017; thrun2005; magill1965; bristow2006; longman2000",
         envs=GAIT,
-        knobs=LEARNING_KNOBS,
+        knobs=KNOBS,
     ),
 }

@@ -94,3 +94,14 @@ def test_stiffness_is_tracked_within_rounding_of_the_sensors(hysteresis):
     record = rollout(env, built("knee_anticipating", env))
     error = (record["output"] - record["reference"])[200:]
     assert rms(error) < 2e-3 * np.ptp(record["reference"])
+
+
+def test_tension_is_held_until_toe_off():
+    plant = KneeOrthosis.on_leg("stairs_down").without_noise()
+    env = make_env("PAM/KneeStairsDown-v0", plant=plant, strides="identical", episode_seconds=11.0)
+    record = rollout(env, built("knee_anticipating", env))
+    stance, error = tracked(record), np.abs(record["output"] - record["reference"])
+    toe_off = np.flatnonzero(stance[:-1] & ~stance[1:])
+    before = np.array([error[k - 20 : k + 1] for k in toe_off])
+    assert len(before) > 1
+    assert before.max() < 8.0  # of 280 N; as fast as the setpoint falls, 5 N a control period
