@@ -35,6 +35,8 @@ from pam_envs.identification.frequency import RationalFit
 Response = Callable[[NDArray[np.float64]], Complex]
 POINTS = 2001
 """Frequencies at which a loop is evaluated."""
+INFINITE = 1e9
+"""Magnitude of a zero over that of the fastest pole from which it is one at infinity, rounded."""
 
 
 @dataclass(frozen=True)
@@ -211,7 +213,9 @@ def _check(plant: StateSpace, bandwidth: float, control_weight: float) -> None:
             f"a pole has real part {slowest}; it must be below 0 for a static gain: identify"
             " the plant about a stable operating point"
         )
-    unstable = plant.zeros()[plant.zeros().real > 0.0]
+    zeros = plant.zeros()
+    finite = np.abs(zeros) < INFINITE * np.abs(plant.poles()).max()
+    unstable = zeros[finite & (zeros.real > 0.0)]
     if unstable.size:
         raise ValueError(
             f"a zero is at {unstable[0]:.4g}; the loop can be recovered only with zeros in the left"

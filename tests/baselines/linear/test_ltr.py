@@ -251,3 +251,12 @@ def test_residualisation_agrees_with_slicot():
     w = 1j * np.geomspace(1e-2, 1e3, 50)
     theirs = control.balred(system, 2, method="matchdc")
     np.testing.assert_allclose(residualised(system, 2)[0](w), theirs(w), rtol=1e-9)
+
+
+def test_zero_at_infinity_is_no_zero():
+    plain = from_polynomials([4.0], [1.0, 5.0, 4.0])
+    output = np.where(plain.C == 0.0, -1e-16, plain.C)
+    rounded = state_space(plain.A, plain.B, output)
+    assert rounded.zeros()[0].real > 1e12
+    expected, found = (design_ltr(plant, 2.0, 1e-4).controller for plant in (plain, rounded))
+    np.testing.assert_allclose(found(1j * W), expected(1j * W), rtol=1e-6)
