@@ -48,7 +48,7 @@ from pam_envs.parameters import Signal
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 SWING = 0.001
-"""Weight of a squared error of the tension in swing, which is not tracked, over that in stance."""
+"""Weight of a squared tension error in swing, which is not tracked, relative to stance."""
 UNKNOWN = 0.3
 """Weight of samples that are neither previewed nor remembered."""
 BLOCKS = (1,) * 8 + (2,) * 6 + (4,) * 10
@@ -246,9 +246,9 @@ class KneeAnticipation(RowController):
         return np.where(stance, np.maximum(tension, 0.0), free) / stretch, weight
 
     def _wholly_in_stance(self, plan: Plan, ends: Array, now: AnticipationState) -> Rows:
-        """Return where the samples before and after a node are in stance, shape (n_env, n_nodes).
+        """Return whether the samples on both sides of each node are in stance, (n_env, n_nodes).
 
-        The tension that is interpolated between stance and swing is that of neither.
+        A tension interpolated between stance and swing belongs to neither.
         """
         present = self.phase.present(plan)[:, None]
         times = present + ends

@@ -36,7 +36,8 @@ Response = Callable[[NDArray[np.float64]], Complex]
 POINTS = 2001
 """Frequencies at which a loop is evaluated."""
 INFINITE = 1e9
-"""Magnitude of a zero over that of the fastest pole from which it is one at infinity, rounded."""
+"""Least ratio of a zero to the fastest pole at which it is a zero at infinity, displaced by
+rounding."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ STEP = 1e-6
 SMALLEST_TORQUE = 1e-9
 SMALLEST_ARM = 1e-12
 ROUNDING = 1e-9
-"""Torque [N m] by which the largest bearable payload may seem too heavy."""
+"""Excess torque [N m] that is attributed to rounding."""
 PRESTRESS_RANGE = (20.0, 120.0)
 """Co-contractions [N] that the preset takes: more and the buckling lever leaves no stiffness."""
 

@@ -104,4 +104,4 @@ def test_tension_is_held_until_toe_off():
     toe_off = np.flatnonzero(stance[:-1] & ~stance[1:])
     before = np.array([error[k - 20 : k + 1] for k in toe_off])
     assert len(before) > 1
-    assert before.max() < 8.0  # of 280 N; as fast as the setpoint falls, 5 N a control period
+    assert before.max() < 8.0  # of 280 N; the setpoint falls by 5 N a control period

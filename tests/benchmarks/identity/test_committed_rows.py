@@ -26,14 +26,6 @@ def test_every_row_is_in_its_round(committed):
     assert [row["row"] for row in committed if not audit.in_last_round(row)] == []
 
 
-def test_every_controller_has_a_verified_row(committed):
-    noted = verified.read(rows.RESULTS)
-    names = {row["controller"]["name"] for row in committed}
-    found = {row["controller"]["name"] for row in committed if verified.of(row, noted)}
-    assert names - found == set()
-
-
-@pytest.mark.xfail(reason="verify --all has not reached all rows", strict=True)
 def test_every_row_is_verified(committed):
     noted = verified.read(rows.RESULTS)
     assert [row["row"] for row in committed if not verified.of(row, noted)] == []
