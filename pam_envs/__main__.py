@@ -223,18 +223,19 @@ def calibrate(
     seed: int = 0,
     quiet: bool = False,
 ) -> None:
-    """Calibrate a base plant for a muscle from a recording or a table of forces.
+    """Calibrate a base plant from a recording, or a muscle from a table of forces.
 
     Parameters
     ----------
     recording : Path
         Recording in time, or table of static forces (docs/base_plant.md).
     rig : Path
-        YAML file with the size of the muscle and other known properties of the rig.
+        YAML file with the plant, the size of its muscles and other known properties of the rig.
     out : Path
         Plant file to write.
     plant : Path
-        Plant file to start from; default: the family of muscles of the rig file, or the nearest.
+        Plant file to start from. Default: the shipped plant with the sizes of the rig file; of a
+        single muscle the family of that file, or the nearest.
     seed : int
         Seed of all random draws.
     quiet : bool
@@ -244,13 +245,9 @@ def calibrate(
     from pam_envs.data.recording.recording import Recording, read_input
     from pam_envs.data.rig_file import Rig
     from pam_envs.diagnosis import calibration
-    from pam_envs.plants.single_muscle.plant import SingleMuscle
+    from pam_envs.diagnosis.families.kinds import kind_named
 
     declared = Rig.from_yaml(rig)
-    if declared.plant != SingleMuscle.family:
-        raise ValueError(
-            f"plant: {declared.plant!r} cannot be calibrated; there is: {SingleMuscle.family}"
-        )
     if out.is_dir():
         raise ValueError(f"{out} is a folder; give the name of the plant file, --out plant.yaml")
     if is_force_table(recording, declared):
@@ -262,7 +259,8 @@ def calibrate(
                 f"{recording} is a table of settled readings, which shows no force; give a "
                 "recording in time, or a table of pressure_bar, contraction_mm and force_N"
             )
-        start = None if plant is None else SingleMuscle.from_yaml(plant)
+        kind = kind_named(declared.plant)
+        start = None if plant is None else type(kind.start(declared)).from_yaml(plant)
         found = calibration.calibrate(data, declared, start, seed=seed, progress=not quiet)
     found.write(out)
     print(found.summary())

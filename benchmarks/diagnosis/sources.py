@@ -34,7 +34,10 @@ HELD_OUT = (
 """Worlds that are never used in the development of the diagnosis."""
 TUNED = tuple(world for world in WORLDS if world not in HELD_OUT)
 """Worlds on which the diagnosis is developed."""
-BY_NATURE = ("static_law", "hysteresis_shape", "hysteresis_drive", "slew_limit", "dead_time")
+BY_NATURE = (
+    *("static_law", "hysteresis_shape", "hysteresis_drive"),
+    *("slew_limit", "dead_time", "exhaust_asymmetry"),
+)
 """Names that a clean rig may deserve: it differs from the base plant by nature."""
 
 
@@ -75,8 +78,8 @@ def nature_of(rig: Any) -> Mapping[str, bool]:
 def deserved(rig: Any) -> list[str]:
     """Return the names that are right on a clean rig, since it differs from the base by nature.
 
-    A rig of another world has another force law and other loops. Its rate limit, its dead time
-    and its drive of the loop are right only where they are there.
+    A rig of another world has another force law and other loops. Its rate limit, dead time,
+    exhaust and drive of the loop are right only where they are present.
     """
     if isinstance(rig, hidden.Base):
         return []

@@ -1,8 +1,9 @@
 """Calibration of a base plant, without a search for causes: ``pam-envs calibrate``.
 
-The base of the diagnosis is fitted to a recording: static law, friction, dead time, lag and rate of
-the regulator, and the differences in which rigs commonly depart from the plant. A table of static
-forces gives the static law alone.
+The base of the diagnosis of a plant is fitted to a recording: static law, friction, dead time, lag
+and rate of the regulator, and the differences in which rigs commonly depart from the plant. A
+single muscle of any size is fitted as the similar one of 10 mm, from the nearest family. A table of
+static forces gives its static law alone.
 """
 
 import dataclasses
@@ -18,11 +19,10 @@ from pam_envs.constants import GRAVITY
 from pam_envs.data.force_table import ForceTable
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.audit.audit import audit
 from pam_envs.diagnosis.audit.noise import noise_floor
-from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.decide.verdict import Decision
 from pam_envs.diagnosis.diagnosis import Study, fit_failures_explained
+from pam_envs.diagnosis.families.kinds import kind_of
 from pam_envs.diagnosis.fit.intervals import at_bound
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.similarity import NO_FLOW, Similarity
@@ -35,12 +35,13 @@ from pam_envs.diagnosis.fit.single_muscle import (
     spread,
     unit_of,
 )
+from pam_envs.diagnosis.plant_protocol import Bound, Kind
 from pam_envs.diagnosis.report.outcome import steps
 from pam_envs.identification.force_table import LawFit, fit_law
 from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle.families import FAMILIES, PRESSURE, base_plant
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-from pam_envs.plants.single_muscle.replay import CHANNELS, replay_rows
+from pam_envs.plants.single_muscle.replay import replay_rows
 
 DEAD_TIME = 0.03
 """Starting value of the dead time [s], which the fit moves."""
@@ -49,7 +50,10 @@ SAME = 1.01
 LEAST_WEIGHT = 1e-6
 """Weight of an element of friction below which it is not used."""
 CALIBRATED = "pam-envs calibrate"
-DISPLAY = {"contraction": ("mm", 1e-3), "pressure": ("bar", 1e5)}
+NO_COMMANDS = (
+    "without commanded pressures the regulator is not fitted: it is that of the plant at the start"
+)
+SAME_SIZE = Similarity(1.0, 1.0)
 WIDTH = 100
 
 
@@ -66,6 +70,8 @@ class Errors:
     held_out: float  # on data that were left out of a fit
     floor: float  # noise of the readings
     source: str  # origin of the noise floor
+    unit: str  # in which the recording has the channel
+    scale: float  # size [SI] of that unit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,7 +80,7 @@ class BasePlant:
 
     Attributes
     ----------
-    plant : SingleMuscle
+    plant : Plant
         The fitted plant, with the provenance of each parameter.
     family : str
         Family of the muscle at the start of the fit; empty for a given plant.
@@ -90,9 +96,11 @@ class BasePlant:
         Limitations of the data.
     forces : LawFit or None
         Fit to a table of forces.
+    regulator : bool
+        Whether the regulator was fitted, too.
     """
 
-    plant: SingleMuscle
+    plant: Any
     family: str
     errors: Mapping[str, Errors]
     differences: tuple[str, ...]
@@ -100,6 +108,7 @@ class BasePlant:
     warnings: tuple[str, ...]
     off: tuple[str, ...] = ()
     forces: LawFit | None = None
+    regulator: bool = True
 
     def write(self, path: str | Path) -> None:
         """Write the plant file, replaced atomically."""
@@ -110,25 +119,26 @@ class BasePlant:
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        p, r = self.plant, self.plant.regulator
+        p, r = self.plant, getattr(self.plant, "regulator", None)
         start = f", from the family {self.family}" if self.family else ""
-        yield (
-            f"{p.family}: {1e3 * p.muscle.diameter:g} mm x {1e3 * p.muscle.rest_length:g} mm, "
-            f"{r.max_pressure / 1e5:g} bar{start}"
-        )
+        sizes = ""
+        if isinstance(p, SingleMuscle):
+            sizes = f": {1e3 * p.muscle.diameter:g} mm x {1e3 * p.muscle.rest_length:g} mm"
+            sizes += f", {p.regulator.max_pressure / 1e5:g} bar"
+        yield f"{p.family}{sizes}{start}"
         if self.forces is not None:
             yield f"force: RMS {self.forces.rms:.3g} N, largest error {self.forces.worst:.3g} N"
         if self.errors:
             yield f"{'RMS error':18}{'before':>10}{'after':>10}{'held out':>10}{'noise':>10}"
         for channel, e in self.errors.items():
-            unit, scale = DISPLAY[channel]
             numbers = (e.before, e.after, e.held_out, e.floor)
-            cells = "".join(f"{value / scale:>10.3g}" for value in numbers)
-            yield f"{f'{channel} [{unit}]':18}{cells}  (noise: {e.source})"
-        if self.errors:
+            cells = "".join(f"{value / e.scale:>10.3g}" for value in numbers)
+            yield f"{f'{channel} [{e.unit}]':18}{cells}  (noise: {e.source})"
+        if self.errors and self.regulator and r is not None:
             rate = f", rate {r.slew_rate / 1e5:.3g} bar/s" if r.slew_rate < 1e8 else ""
             air = f"lag {1e3 * r.time_constant:.3g} ms" if p.air == "regulator" else "orifices"
             yield f"regulator: dead time {1e3 * r.dead_time:.3g} ms, {air}{rate}"
+        if self.errors:
             yield f"differences from the plain plant: {', '.join(self.differences) or 'none'}"
         if self.off:
             text = f"at 0, not shown by the recording: {', '.join(self.off)}"
@@ -141,7 +151,7 @@ class BasePlant:
 def calibrate(
     recording: Recording,
     rig: Rig,
-    plant: SingleMuscle | None = None,
+    plant: Any = None,
     *,
     seed: int = 0,
     progress: bool = True,
@@ -153,9 +163,10 @@ def calibrate(
     recording : Recording
         See :func:`pam_envs.data.recording.recording.load_recording`.
     rig : Rig
-        Known properties of the rig, with the size of the muscle.
-    plant : SingleMuscle, optional
-        Plant to fit. Default: the family of ``rig``, or the nearest to the recording.
+        Known properties of the rig; of a single muscle, its size too.
+    plant : Plant, optional
+        Plant to fit, of the rig's family. Default: the shipped plant of that family with the sizes
+        of the rig; for a single muscle, that of its family, or the nearest to the recording.
     seed : int
         Seed of all random draws.
     progress : bool
@@ -166,59 +177,109 @@ def calibrate(
     ValueError
         If the data cannot be used; the sentences name rows and remedies.
     """
+    kind = kind_of(plant, rig)
     with fit_failures_explained(), steps(progress) as step:
         step("checking the data")
-        checked = audit(recording, rig).passed()
+        checked = kind.audit(recording, rig).passed()
+        # a plant file holds no clock: an offset is part of the dead time unless a limit is declared
+        sheet = dataclasses.replace(rig, clock_tolerance=rig.clock_tolerance or 0.0)
+        if kind.name == SingleMuscle.family:
+            begun = Start.of_muscle(recording, sheet, plant)
+        else:
+            begun = Start(recording, sheet, kind.start(sheet) if plant is None else plant)
+        step("refitting the plant")
+        study = begun.study(kind)
+        step("differences from the plain plant")
+        study.make_flexible(kind.causes(kind.catalogue))
+        study.seed, study.decision = seed, Decision("adequate", study.normal)
+        step("held-out experiments")
+        study.hold_out()
+    found = study.normal
+    made = begun.original(study, f"{CALIBRATED}, recording {recording.digest[:12]}")
+    valve = any(free.name.startswith("regulator.") for free in found.fit.frees)
+    unfitted = () if valve else (NO_COMMANDS,)
+    bounds = dict(
+        _bounds(made, found.fit.frees, found.fit.values(), begun.similar.inverse, study.family)
+    )
+    return BasePlant(
+        plant=made,
+        family=begun.family,
+        errors=_errors(study, begun, recording),
+        differences=found.names,
+        at_bound=tuple(text for text in bounds.values() if text),
+        off=tuple(name for name, text in bounds.items() if not text),
+        warnings=tuple(dict.fromkeys((*checked.warnings, *unfitted))),
+        regulator=valve,
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Start:
+    """Plant, recording and rig of a fit; for a single muscle, those of the similar one.
+
+    Attributes
+    ----------
+    recording, sheet, plant
+        What is fitted.
+    family : str
+        Family of the muscle; empty for a given plant.
+    similar : Similarity
+        Factors from the original.
+    """
+
+    recording: Recording
+    sheet: Rig
+    plant: Any
+    family: str = ""
+    similar: Similarity = SAME_SIZE
+
+    @classmethod
+    def of_muscle(cls, recording: Recording, sheet: Rig, plant: SingleMuscle | None) -> "Start":
+        """Return the start of a single muscle."""
         if recording.contraction is None:
             raise ValueError(
                 "the recording has no column contraction_mm, which the muscle is calibrated to; "
                 "record it, or give a table of forces (pressure_bar, contraction_mm, force_N)"
             )
-        # a plant file holds no clock: an offset is part of the dead time unless a limit is declared
-        sheet = dataclasses.replace(rig, clock_tolerance=rig.clock_tolerance or 0.0)
         family = ""
         if plant is None:
             family, plant = nearest(recording, sheet)
         similar = Similarity.of(plant)
-        alike, rig_alike = similar.recording(recording), similar.rig(sheet)
         begin = similar.plant(plant)
         if similar.pressure != 1.0:
             begin = begin.replace(NO_FLOW)
-        step("refitting the plant")
-        study = Study.begin(alike, rig_alike, begin, noise_floor(alike, rig_alike))
-        step("differences from the plain plant")
-        study.make_flexible(catalogue())
-        study.seed, study.decision = seed, Decision("adequate", study.normal)
-        step("held-out experiments")
-        study.hold_out()
-    found = study.normal
-    source = f"{CALIBRATED}, recording {recording.digest[:12]}"
-    fitted = similar.inverse.plant(study.plant_of(found))
-    made = identified(fitted, found.fit.frees, source)
-    load = {"mass.load": float(np.median(recording.load)) / GRAVITY}
-    loaded = made.replace(load)
-    loads = {"mass.load": ("assumed", f"median of the recording, {source}")}
-    loaded = dataclasses.replace(loaded, provenance={**loaded.provenance, **loads})
-    bounds = dict(_bounds(loaded, found.fit.frees, found.fit.values(), similar.inverse))
-    return BasePlant(
-        plant=loaded,
-        family=family,
-        errors=_errors(study, begin, similar.inverse),
-        differences=found.names,
-        at_bound=tuple(text for text in bounds.values() if text),
-        off=tuple(name for name, text in bounds.items() if not text),
-        warnings=tuple(dict.fromkeys(checked.warnings)),
-    )
+        return cls(similar.recording(recording), similar.rig(sheet), begin, family, similar)
+
+    def study(self, kind: Kind) -> Study:
+        """Fit the base of the plant."""
+        floor = noise_floor(self.recording, self.sheet)
+        return Study.begin(self.recording, self.sheet, self.plant, floor, kind)
+
+    def original(self, study: Study, source: str) -> Any:
+        """Return the fitted plant of a study in the original size, with its provenance."""
+        frees, fitted = study.normal.fit.frees, study.plant_of(study.normal)
+        if not isinstance(fitted, SingleMuscle):
+            return study.family.identified(fitted, frees, source)
+        made = identified(self.similar.inverse.plant(fitted), frees, source)
+        load = float(np.median(self.recording.load)) / self.similar.force
+        loads = {"mass.load": ("assumed", f"median of the recording, {source}")}
+        loaded = made.replace({"mass.load": load / GRAVITY})
+        return dataclasses.replace(loaded, provenance={**loaded.provenance, **loads})
 
 
 def calibrate_forces(table: ForceTable, rig: Rig) -> BasePlant:
-    """Fit the static law to a table of forces; everything else is that of the family.
+    """Fit the static law of a muscle to a table of forces; all else is that of the family.
 
     Raises
     ------
     ValueError
         Naming what RIG.yaml lacks.
     """
+    if rig.plant != SingleMuscle.family:
+        raise ValueError(
+            f"plant: {rig.plant!r} is not calibrated to a table of forces; give a recording in "
+            f"time, or plant: {SingleMuscle.family} for the table of one of its muscles"
+        )
     full = rig.max_pressure or float(table.pressure.max())
     fits = []
     for family in (rig.family,) if rig.family else FAMILIES:
@@ -284,21 +345,21 @@ def nearest(recording: Recording, rig: Rig) -> tuple[str, SingleMuscle]:
     return best, starts[best]
 
 
-def _errors(study: Study, plant: SingleMuscle, original: Similarity) -> dict[str, Errors]:
+def _errors(study: Study, begun: Start, recording: Recording) -> dict[str, Errors]:
     """Return the RMS errors by channel, zero offsets and settling removed."""
-    scales = {"contraction": 1.0, "pressure": original.pressure}
     problem, held = study.problem, study.held
     assert held is not None
-    column = np.append(plant.parameter_rows(), 0.0)
-    before = problem.shaped(study.family.simulate(column[None])[:, :, 0])
+    first = study.kind.bind(begun.plant, study.recording, study.sheet)
+    before = problem.shaped(first.simulate(first.column[None])[:, :, 0])
     after = problem.shaped(study.outputs(study.normal))
     left = held.problem.rows(held.model.fit.residual) * problem.noise[:, None]
     found = {}
-    for k, channel in enumerate(CHANNELS):
+    for k, channel in enumerate(study.family.channels):
         if not np.isfinite(problem.measured[k]).any():
             continue
         floor, source = study.floor_of(channel)
-        scale = scales[channel]
+        shown = recording.channel(channel)
+        scale = 1.0 / begun.similar.pressure if channel == "pressure" else 1.0
         unseen = ~(held.rows & np.isfinite(problem.measured[k]))
         found[channel] = Errors(
             scale * _rms(before[k] - problem.measured[k]),
@@ -306,6 +367,8 @@ def _errors(study: Study, plant: SingleMuscle, original: Similarity) -> dict[str
             scale * _rms(np.where(unseen, np.nan, left[k])),
             scale * floor,
             source,
+            shown.unit,
+            shown.scale,
         )
     return found
 
@@ -315,16 +378,24 @@ def _rms(values: Array) -> float:
 
 
 def _bounds(
-    plant: SingleMuscle, frees: Sequence[Free], values: Mapping[str, float], original: Similarity
+    plant: Any,
+    frees: Sequence[Free],
+    values: Mapping[str, float],
+    original: Similarity,
+    family: Bound | None = None,
 ) -> Iterator[tuple[str, str]]:
     """Yield the parameters at a bound with a sentence, which is empty at a neutral value."""
     for free in frees:
         value = values[free.name]
         weight = free.name.startswith("hysteresis.weight")
         if at_bound(free, value) and not (weight and value < LEAST_WEIGHT):
-            f, unit = original.factor_of(plant, free.name), unit_of(plant, free.name)
+            if family is None or isinstance(plant, SingleMuscle):
+                f, unit = original.factor_of(plant, free.name), unit_of(plant, free.name)
+            else:
+                f, unit = 1.0, family.declared(free.name).unit
             text = _at_bound(free.name, f * value, f * free.low, f * free.high, unit)
-            yield free.name, "" if value == WITHOUT.get(free.name) else text
+            without = WITHOUT.get(free.name, plant.neutral.get(free.name))
+            yield free.name, "" if value == without else text
 
 
 def _at_bound(name: str, value: float, low: float, high: float, unit: str) -> str:

@@ -16,10 +16,12 @@ from pam_envs.diagnosis.calibration import BasePlant, Errors, _bounds, calibrate
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.similarity import Similarity
 from pam_envs.diagnosis.fit.single_muscle import inputs_of
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.single_muscle.families import base_plant
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import replay_rows
 from tests.diagnosis.conftest import needs_kernels
+from tests.diagnosis.families import family_rigs, joint_rig
 
 PERIOD = 0.02
 TRUE = {
@@ -103,6 +105,51 @@ def test_muscle_of_any_size_is_calibrated_to_its_noise(case, tmp_path):
     assert f"from the family {found.family}" in summary
 
 
+FITTED = {
+    "ELBOW": ("regulator.dead_time", "bundle_a.pressure_each", "bundle_b.pressure_each"),
+    "KNEE": ("regulator.dead_time", "muscle.gain"),
+    "HELD": ("regulator.dead_time", "muscle.gain"),
+    "ARM": ("regulator.dead_time", "muscle.area"),
+}
+
+
+@needs_kernels
+@pytest.mark.parametrize("family", FITTED)
+def test_other_plants_are_calibrated_to_their_noise(family, tmp_path):
+    rig = getattr(family_rigs, family)
+    found = calibrate(rig.recorded(), rig.sheet, rig.start, progress=False)
+    assert set(found.errors) == set(rig.outputs)
+    some = 2.0 if family == "ARM" else 1.25  # few samples of the arm's slow directions
+    for channel, errors in found.errors.items():
+        assert errors.held_out < some * errors.floor, channel
+    assert max(e.before / e.after for e in found.errors.values()) > 5.0
+    for name in FITTED[family]:
+        assert found.plant.value(name) == pytest.approx(rig.truth().value(name), rel=0.03), name
+    found.write(tmp_path / "plant.yaml")
+    assert type(found.plant).from_yaml(tmp_path / "plant.yaml") == found.plant
+    assert found.summary().startswith(f"{rig.plant.family}\nRMS error")
+    assert "regulator: dead time" in found.summary()
+
+
+@needs_kernels
+def test_joint_without_commands_is_calibrated_but_for_its_regulator():
+    whole = joint_rig.recorded()
+    blind = Recording.of_channels(
+        whole.time,
+        {"payload": whole.inputs["payload"]},
+        whole.outputs,
+        plant=joint_rig.SHEET.plant,
+        segment=[whole.segments[k] for k in whole.segment],
+    )
+    found = calibrate(blind, joint_rig.SHEET, progress=False)
+    errors = found.errors["angle"]
+    assert errors.held_out < 2.0 * errors.floor < errors.before
+    assert "regulator: dead time" not in found.summary()
+    assert any("the regulator is not fitted" in text for text in found.warnings)
+    default = AntagonisticJoint.paper().regulator
+    assert found.plant.regulator.time_constant == default.time_constant
+
+
 @needs_kernels
 def test_command_line_writes_the_plant(tmp_path, capsys):
     recording, rig = example.recording_and_rig()
@@ -143,7 +190,7 @@ def test_parameter_at_its_bound_is_told_with_value_bounds_and_remedy():
         "muscle.area = 12.8 m2 is at a bound of [6.4e-06, 12.8] m2"
     )
     assert "check the sizes in RIG.yaml" in said["muscle.area"]
-    errors = {"contraction": Errors(1e-3, 1e-4, 2e-4, 1e-4, "holds")}
+    errors = {"contraction": Errors(1e-3, 1e-4, 2e-4, 1e-4, "holds", "mm", 1e-3)}
     text = BasePlant(plant, "", errors, (), (said["muscle.area"],), ("w",), ("x",)).summary()
     assert "at a bound: muscle.area = 12.8 m2" in text
     assert "at 0, not shown by the recording: x" in text
@@ -171,7 +218,11 @@ PRESSURES = [HEAD.rpartition(",")[0], *(row.rpartition(",")[0] for row in ROWS)]
     ("rig", "lines", "said"),
     [
         ("plant: single_muscle\n", [HEAD, *ROWS], "a calibration needs muscle.rest_length_mm; add"),
-        ("plant: knee_orthosis\n", [HEAD, *ROWS], "'knee_orthosis' cannot be calibrated; there"),
+        (
+            "plant: knee_orthosis\n",
+            ["pressure_bar,contraction_mm,force_N", *(f"{p},{x},9" for p in "123" for x in "123")],
+            "'knee_orthosis' is not calibrated to a table of forces; give a recording in time",
+        ),
         (SIZED, READINGS, "is a table of settled readings, which shows no force"),
         (SIZED, PRESSURES, "has no column contraction_mm, which the muscle is calibrated to"),
         (

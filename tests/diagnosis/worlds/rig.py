@@ -188,14 +188,26 @@ def draw_rig(world: str, rng: np.random.Generator, nuisance: bool = True) -> Rig
     )
 
 
-def truth_of(rig: Rig) -> dict[str, bool]:
-    """Return which of three causes the normal physics of a rig contains.
+UNLIKE = 0.03
+"""Relative difference above which exhaust and filling count as different."""
 
-    A choked orifice limits the rate of large steps, so it counts as a rate limit.
+
+def truth_of(rig: Rig) -> dict[str, bool]:
+    """Return which of four causes the normal physics of a rig contains.
+
+    A choked orifice limits the rate of large steps, so it counts as a rate limit. The exhaust
+    differs where orifice, rate limit or lag differ by more than 3 % from those of filling.
     """
+    value = rig.valve_value
+    pairs = (
+        (value("fill_bar_s"), value("vent_bar_s")),
+        (value("fill_limit_s_bar"), value("vent_limit_s_bar")),
+        (value("lag_s"), value("vent_lag_s")) if value("vent_delay_s") > 0.0 else (0.0, 0.0),
+    )
     limited = rig.valve_value("fill_limit_s_bar") > 0.0 or rig.valve_value("fill_bar_s") > 0.0
     return {
         "slew_limit": limited,
         "dead_time": rig.valve_value("dead_time_s") >= 0.01,
         "hysteresis_drive": rig.length_driven,
+        "exhaust_asymmetry": any(abs(b - a) > UNLIKE * a for a, b in pairs),
     }
