@@ -193,11 +193,10 @@ def diagnose(
     if isinstance(data, Recording):
         from pam_envs.diagnosis.causes import causes_in
         from pam_envs.diagnosis.diagnosis import diagnose as run
-        from pam_envs.diagnosis.families.kinds import kind_named
+        from pam_envs.diagnosis.families.kinds import kind_named, plant_from
 
-        kind = kind_named(declared.plant)
-        model = None if plant is None else type(kind.start(declared)).from_yaml(plant)
-        every = (*kind.catalogue, *(causes_in(causes) if causes else ()))
+        model = plant_from(plant, declared)
+        every = (*kind_named(declared.plant).catalogue, *(causes_in(causes) if causes else ()))
         found = run(data, model, rig=declared, causes=every, seed=seed, progress=not quiet)
         print(f"{found.verdict}: {found.text}")
         for warning in found.report["warnings"]:
@@ -245,7 +244,7 @@ def calibrate(
     from pam_envs.data.recording.recording import Recording, read_input
     from pam_envs.data.rig_file import Rig
     from pam_envs.diagnosis import calibration
-    from pam_envs.diagnosis.families.kinds import kind_named
+    from pam_envs.diagnosis.families.kinds import plant_from
 
     declared = Rig.from_yaml(rig)
     if out.is_dir():
@@ -259,8 +258,7 @@ def calibrate(
                 f"{recording} is a table of settled readings, which shows no force; give a "
                 "recording in time, or a table of pressure_bar, contraction_mm and force_N"
             )
-        kind = kind_named(declared.plant)
-        start = None if plant is None else type(kind.start(declared)).from_yaml(plant)
+        start = plant_from(plant, declared)
         found = calibration.calibrate(data, declared, start, seed=seed, progress=not quiet)
     found.write(out)
     print(found.summary())

@@ -252,9 +252,10 @@ class KneeAnticipation(RowController):
         """
         present = self.phase.present(plan)[:, None]
         times = present + ends
-        around = [self._ahead(plan, whole(times) - present)[0] for whole in (np.floor, np.ceil)]
-        before, after = (self._in_stance(part[:, 0], part[:, 1], now) for part in around)
-        return before & after
+        around = np.concatenate([np.floor(times), np.ceil(times)], axis=1)
+        samples, _ = self._ahead(plan, around - present)
+        before, after = np.hsplit(self._in_stance(samples[:, 0], samples[:, 1], now), 2)
+        return np.asarray(before & after)
 
     def _ahead(self, plan: Plan, ends: Array) -> tuple[Array, Rows]:
         """Return the planned samples after ``ends`` periods, and where they are known."""

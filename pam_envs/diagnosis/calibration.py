@@ -22,10 +22,11 @@ from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.noise import noise_floor
 from pam_envs.diagnosis.decide.verdict import Decision
 from pam_envs.diagnosis.diagnosis import Study, fit_failures_explained
+from pam_envs.diagnosis.families.compiled import in_valve
 from pam_envs.diagnosis.families.kinds import kind_of
 from pam_envs.diagnosis.fit.intervals import at_bound
 from pam_envs.diagnosis.fit.least_squares import Free
-from pam_envs.diagnosis.fit.similarity import NO_FLOW, Similarity
+from pam_envs.diagnosis.fit.similarity import NO_FLOW, SAME_SIZE, Similarity
 from pam_envs.diagnosis.fit.single_muscle import (
     PLAIN_NEUTRAL,
     SWITCHED_OFF,
@@ -33,9 +34,8 @@ from pam_envs.diagnosis.fit.single_muscle import (
     identified,
     inputs_of,
     spread,
-    unit_of,
 )
-from pam_envs.diagnosis.plant_protocol import Bound, Kind
+from pam_envs.diagnosis.plant_protocol import Kind
 from pam_envs.diagnosis.report.outcome import steps
 from pam_envs.identification.force_table import LawFit, fit_law
 from pam_envs.parameters import declarations
@@ -53,7 +53,6 @@ CALIBRATED = "pam-envs calibrate"
 NO_COMMANDS = (
     "without commanded pressures the regulator is not fitted: it is that of the plant at the start"
 )
-SAME_SIZE = Similarity(1.0, 1.0)
 WIDTH = 100
 
 
@@ -196,11 +195,11 @@ def calibrate(
         study.hold_out()
     found = study.normal
     made = begun.original(study, f"{CALIBRATED}, recording {recording.digest[:12]}")
-    valve = any(free.name.startswith("regulator.") for free in found.fit.frees)
+    frees, values = found.fit.frees, found.fit.values()
+    valve = any(in_valve(free.name) for free in frees)
     unfitted = () if valve else (NO_COMMANDS,)
-    bounds = dict(
-        _bounds(made, found.fit.frees, found.fit.values(), begun.similar.inverse, study.family)
-    )
+    units = {free.name: study.family.declared(free.name).unit for free in frees}
+    bounds = dict(_bounds(made, frees, values, units, begun.similar.inverse))
     return BasePlant(
         plant=made,
         family=begun.family,
@@ -381,19 +380,16 @@ def _bounds(
     plant: Any,
     frees: Sequence[Free],
     values: Mapping[str, float],
+    units: Mapping[str, str],
     original: Similarity,
-    family: Bound | None = None,
 ) -> Iterator[tuple[str, str]]:
     """Yield the parameters at a bound with a sentence, which is empty at a neutral value."""
     for free in frees:
         value = values[free.name]
         weight = free.name.startswith("hysteresis.weight")
         if at_bound(free, value) and not (weight and value < LEAST_WEIGHT):
-            if family is None or isinstance(plant, SingleMuscle):
-                f, unit = original.factor_of(plant, free.name), unit_of(plant, free.name)
-            else:
-                f, unit = 1.0, family.declared(free.name).unit
-            text = _at_bound(free.name, f * value, f * free.low, f * free.high, unit)
+            f = original.factor_of(plant, free.name)
+            text = _at_bound(free.name, f * value, f * free.low, f * free.high, units[free.name])
             without = WITHOUT.get(free.name, plant.neutral.get(free.name))
             yield free.name, "" if value == without else text
 

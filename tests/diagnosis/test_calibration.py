@@ -183,7 +183,8 @@ def test_parameter_at_its_bound_is_told_with_value_bounds_and_remedy():
     values = {"muscle.area": rounded, "muscle.stiffness": 9e5}
     values |= {"muscle.strand_1": 0.0, "hysteresis.weight[0]": 0.0}
     larger = Similarity(1.0 / 64.0, 1.0).inverse
-    said = dict(_bounds(plant, frees, values, larger))
+    units = dict(zip(values, ("m2", "N/m", "N", "1"), strict=True))
+    said = dict(_bounds(plant, frees, values, units, larger))
     assert set(said) == {"muscle.area", "muscle.strand_1"}
     assert said["muscle.strand_1"] == ""  # an effect that is off
     assert said["muscle.area"].startswith(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from pam_envs.data.rig_file import Rig
@@ -28,6 +29,11 @@ def kind_named(name: str) -> Kind:
     module = import_module(f"pam_envs.diagnosis.families.{name}")
     make: Callable[[], Kind] = getattr(module, KINDS[name])
     return make()
+
+
+def plant_from(path: Path | None, sheet: Rig) -> Any:
+    """Return the plant of a file, of the family of a rig; None without a file."""
+    return None if path is None else type(kind_named(sheet.plant).start(sheet)).from_yaml(path)
 
 
 def kind_of(plant: Any, sheet: Rig, declared: bool = True) -> Kind:

@@ -69,7 +69,7 @@ class Similarity:
 
     def factor_of(self, plant: SingleMuscle, name: str) -> float:
         """Return the factor on a parameter by its dotted name."""
-        if name in KEPT_NAMES or name in plant.inert or name not in R.NAMES:
+        if self == SAME_SIZE or name in KEPT_NAMES or name in plant.inert or name not in R.NAMES:
             return 1.0
         return self.factor(plant.declaration(name).unit)
 
@@ -124,3 +124,7 @@ class Similarity:
             max_pressure=None if full is None else full * self.pressure,
             pressure_noise=None if noise is None else noise * self.pressure,
         )
+
+
+SAME_SIZE = Similarity(1.0, 1.0)
+"""That of a plant to itself."""

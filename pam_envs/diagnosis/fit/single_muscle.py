@@ -275,13 +275,6 @@ UNUSED_MAP = {
 """Range of a map without terms."""
 
 
-def unit_of(plant: SingleMuscle, name: str) -> str:
-    """Return the SI unit of a free parameter."""
-    if name == CLOCK:
-        return "s"
-    return "1" if name.startswith("hysteresis.weight") else plant.declaration(name).unit
-
-
 def states_of(contraction: Array, pressure: Array, plant: SingleMuscle) -> Array:
     """Return mean pressures [Pa] and strains of groups of recorded states, and beside, (2, k).
 

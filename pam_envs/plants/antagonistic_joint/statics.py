@@ -20,9 +20,8 @@ from pam_envs.pneumatics.regulator import JointRegulator
 
 STEP = 1e-6
 SMALLEST_TORQUE = 1e-9
+"""Largest missing torque [N m] that is attributed to rounding."""
 SMALLEST_ARM = 1e-12
-ROUNDING = 1e-9
-"""Excess torque [N m] that is attributed to rounding."""
 PRESTRESS_RANGE = (20.0, 120.0)
 """Co-contractions [N] that the preset takes: more and the buckling lever leaves no stiffness."""
 
@@ -243,7 +242,7 @@ def check_borne(
     needed_torque = plant.weight_torque(angles, payload)
     short = np.maximum(needed_torque - high, low - needed_torque)
     pose, joint = np.unravel_index(int(np.argmax(short)), short.shape)
-    if short[pose, joint] <= ROUNDING:
+    if short[pose, joint] <= SMALLEST_TORQUE:
         return
     needed = float(needed_torque[pose, joint])
     there = float((high if needed > high[pose, joint] else low)[pose, joint])

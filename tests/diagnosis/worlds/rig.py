@@ -204,10 +204,10 @@ def truth_of(rig: Rig) -> dict[str, bool]:
         (value("fill_limit_s_bar"), value("vent_limit_s_bar")),
         (value("lag_s"), value("vent_lag_s")) if value("vent_delay_s") > 0.0 else (0.0, 0.0),
     )
-    limited = rig.valve_value("fill_limit_s_bar") > 0.0 or rig.valve_value("fill_bar_s") > 0.0
+    limited = value("fill_limit_s_bar") > 0.0 or value("fill_bar_s") > 0.0
     return {
         "slew_limit": limited,
-        "dead_time": rig.valve_value("dead_time_s") >= 0.01,
+        "dead_time": value("dead_time_s") >= 0.01,
         "hysteresis_drive": rig.length_driven,
         "exhaust_asymmetry": any(abs(b - a) > UNLIKE * a for a, b in pairs),
     }
