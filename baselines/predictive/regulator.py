@@ -161,6 +161,15 @@ class RegulatorBank:
         kept = (1.0 - 1.0 / MEMORY) * state.deviation
         return state._replace(deviation=kept + error)
 
+    def alike(self, state: BankState, count: int) -> BankState:
+        """Return the state in which ``count`` rows in turn have the same regulator.
+
+        Each has the mean of their deviations.
+        """
+        members = state.deviation.reshape(-1, count, state.deviation.shape[1])
+        mean = np.add.reduce(members, axis=1) / count
+        return state._replace(deviation=np.repeat(mean, count, axis=0))
+
     def advance(self, state: BankState, set_point: Array) -> BankState:
         """Return the state one control period later, under setpoints [Pa], shape (n_env,)."""
         commands = np.concatenate([set_point[:, None], state.commands[:, :-1]], axis=1)

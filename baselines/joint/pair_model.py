@@ -1,0 +1,296 @@
+"""Nominal muscles of joints over rows: pressures of a setpoint, torque and friction, linear motion.
+
+The friction is driven by the length of the muscles, and so by the angle, which is sensed: its state
+is known without a model of the motion. Geometry and force law are tabulated over the angle.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+
+from baselines.predictive.regulator import regulated
+from pam_envs.arrays import Array
+from pam_envs.hysteresis.slip import SlipModel, slip_lag, slip_to
+from pam_envs.kernels.build import entry, kernel
+from pam_envs.plants.antagonistic_joint.statics import PairPlant
+
+POINTS = 1201
+"""Angles, and setpoints, of the tables."""
+BEYOND = 0.1
+"""Angle [rad] beyond the stop that the table covers."""
+STRAIN, LEVER, AREA, PASSIVE, STIFFNESS = 0, 2, 4, 6, 8
+"""Columns of the table, those of both muscles side by side: contraction beyond that of the straight
+joint [1], ``dL/dphi`` [m], force over pressure [m2], passive force [N]; stiffness [N m/rad]."""
+DRAG, LIMIT, LIMIT_RATE, VISCOSITY, DAMPING, LENGTH, FIRST, PER_ANGLE = range(8)
+"""Numbers of the model: friction over lag [N], slip limit without pressure [1] and its rise [1/Pa],
+viscosity over length [m s], damping [N m s/rad], rest length [m], first angle of the table [rad]
+and its cells per angle [1/rad]."""
+
+
+@kernel
+def cell_at(table: Any, numbers: Any, angle: float) -> tuple[int, float]:
+    """Return the cell of an angle [rad], and the share of it below the angle."""
+    place = min(max((angle - numbers[FIRST]) * numbers[PER_ANGLE], 0.0), len(table) - 1.001)
+    cell = int(place)
+    return cell, place - cell
+
+
+@kernel
+def looked_up(table: Any, cell: int, share: float, column: int) -> float:
+    """Return a column at a share of a cell."""
+    low = table[cell][column]
+    return low + share * (table[cell + 1][column] - low)  # type: ignore[no-any-return]
+
+
+@kernel
+def rub(
+    table: Any, numbers: Any, slip: Any, cell: int, share: float, pressures: Any, sliders: Any
+) -> tuple[float, float]:
+    """Return the torque [N m] of the friction, and the stiffness [N m/rad] of the part that sticks.
+
+    The sliders of both muscles, shape (2, elements), move to the angle.
+    """
+    thresholds, curves, low, per = slip
+    torque, stiffness = 0.0, 0.0
+    for side in range(2):
+        limit = numbers[LIMIT] + numbers[LIMIT_RATE] * pressures[side]
+        x = looked_up(table, cell, share, STRAIN + side)
+        lever = looked_up(table, cell, share, LEVER + side)
+        lag, stuck = slip_lag(x, limit, thresholds, curves, low, per, sliders[side])
+        slip_to(x, limit, thresholds, sliders[side], sliders[side])
+        torque = torque + numbers[DRAG] * lag * lever
+        stiffness = stiffness + numbers[DRAG] * stuck * lever * lever / numbers[LENGTH]
+    return torque, stiffness
+
+
+@entry
+def pull_rows(
+    table: Array, numbers: Array, thresholds: Array, curves: Array, low: float, per: float,
+    angle: Array, pressures: Array, sliders: Array, found: Array,
+) -> None:  # fmt: skip
+    """Write torque [N m], stiffness [N m/rad] and damping [N m s/rad] of pairs, shape (3, rows).
+
+    The sliders, shape (rows, 2, elements), move to the angles [rad]; pressures [Pa], (rows, 2).
+    """
+    slip = (thresholds, curves, low, per)
+    for r in range(len(angle)):
+        cell, share = cell_at(table, numbers, angle[r])
+        torque, stiffness = rub(table, numbers, slip, cell, share, pressures[r], sliders[r])
+        damping = numbers[DAMPING]
+        for side in range(2):
+            lever = looked_up(table, cell, share, LEVER + side)
+            force = pressures[r, side] * looked_up(table, cell, share, AREA + side)
+            force = max(0.0, force - looked_up(table, cell, share, PASSIVE + side))
+            torque = torque - force * lever
+            damping = damping + numbers[VISCOSITY] * pressures[r, side] * lever * lever
+        found[0, r], found[2, r] = torque, damping
+        found[1, r] = stiffness + looked_up(table, cell, share, STIFFNESS)
+
+
+@entry
+def rub_rows(
+    table: Array, numbers: Array, thresholds: Array, curves: Array, low: float, per: float,
+    angles: Array, pressures: Array, sliders: Array, torques: Array,
+) -> None:  # fmt: skip
+    """Write the torques of friction [N m] at angles in turn, shape (rows, n); the sliders move."""
+    slip = (thresholds, curves, low, per)
+    for r in range(len(angles)):
+        for k in range(angles.shape[1]):
+            cell, share = cell_at(table, numbers, angles[r, k])
+            torque, _ = rub(table, numbers, slip, cell, share, pressures[r], sliders[r])
+            torques[r, k] = torque
+
+
+@kernel
+def difference_after(both: Any, k: int, later: Any, lag: float, rate: float, time: float) -> float:
+    """Return the difference [Pa] of both pressures after a time [s] under setpoint ``k``."""
+    a = regulated(later[0], both[0, k], lag, rate, time)
+    return a - regulated(later[1], both[1, k], lag, rate, time)
+
+
+@entry
+def command_rows(
+    angles: Array, both: Array, later: Array, wanted: Array, lag: Array, rate: Array, time: float,
+    found: Array,
+) -> None:  # fmt: skip
+    """Write the setpoints [rad] that lead to a difference [Pa] of both pressures after a time [s].
+
+    ``angles`` and ``both``, shapes (n,) and (2, n), are setpoints and their pressures [Pa],
+    ``later``, shape (rows, 2), the pressures when a setpoint takes effect.
+    """
+    for r in range(len(wanted)):
+        low, high = 0, len(angles) - 1
+        least = difference_after(both, low, later[r], lag[r], rate[r], time)
+        most = difference_after(both, high, later[r], lag[r], rate[r], time)
+        while high - low > 1:
+            middle = (low + high) // 2
+            there = difference_after(both, middle, later[r], lag[r], rate[r], time)
+            if there < wanted[r]:
+                low, least = middle, there
+            else:
+                high, most = middle, there
+        share = (wanted[r] - least) / (most - least) if most > least else 0.5
+        share = max(0.0, min(1.0, share))
+        found[r] = angles[low] + share * (angles[high] - angles[low])
+
+
+class Pull(NamedTuple):
+    """Torque [N m], stiffness [N m/rad] and damping [N m s/rad] of pairs, shape (rows,) each."""
+
+    torque: Array
+    stiffness: Array
+    damping: Array
+
+
+@dataclass(frozen=True)
+class PairModel:
+    """Nominal muscles of a joint, whose friction is driven by length."""
+
+    plant: PairPlant
+
+    @staticmethod
+    def fits(plant: Any) -> bool:
+        """Return whether a plant has muscles, with friction driven by length."""
+        return plant.dynamics == "muscles" and isinstance(plant.hysteresis.model, SlipModel)
+
+    # --- setpoints ------------------------------------------------------------------------------
+
+    @cached_property
+    def _set_points(self) -> tuple[Array, Array]:
+        angles = np.linspace(*self.plant.angle_range, POINTS)
+        a, b, _ = self.plant.pressures_for(angles, self.plant.prestress)
+        return angles, np.array([a, b])
+
+    def pressures(self, set_point: Array) -> Array:
+        """Return the pressures [Pa] of setpoints [rad], shape (..., 2)."""
+        angles, both = self._set_points
+        return np.stack([np.interp(set_point, angles, one) for one in both], axis=-1)
+
+    def difference(self, set_point: Array) -> Array:
+        """Return the difference [Pa] of both pressures at setpoints [rad]."""
+        angles, (a, b) = self._set_points
+        return np.interp(set_point, angles, a - b)
+
+    def command(self, later: Array, wanted: Array, lag: Array, rate: Array, period: float) -> Array:
+        """Return the setpoints [rad] that lead to a difference [Pa] of pressures, shape (rows,).
+
+        ``later``, shape (rows, 2), are the pressures [Pa] when a setpoint takes effect, a period
+        [s] before; lag [s] and rate [Pa/s] those of the regulators, shape (rows,).
+        """
+        found = np.empty_like(wanted)
+        rows: Any = [np.ascontiguousarray(part) for part in (later, wanted, lag, rate)]
+        command_rows(*self._set_points, *rows, period, found)
+        return found
+
+    # --- torque ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _tables(self) -> Any:
+        plant, muscle, law = self.plant, self.plant.muscle, self.plant.hysteresis
+        edge, length = plant.largest_angle + BEYOND, muscle.rest_length
+        angles = np.linspace(-edge, edge, POINTS)
+        x = plant.lever.contraction(angles, length)
+        strain = x - plant.lever.contraction(0.0, length)
+        stiffness = plant.stiffness_at(np.clip(angles, *plant.angle_range))[:, None]
+        rest = plant.lever.rate(angles), muscle.area_at(x), muscle.passive(x), stiffness
+        per_pascal = float(law.slip(1e5) - law.slip(0.0)) / 1e5
+        friction = float(law.stiffness(0.0)), float(law.slip(0.0)), per_pascal
+        viscous, cells = muscle.viscosity / length, (POINTS - 1) / (2.0 * edge)
+        numbers = np.array([*friction, viscous, plant.link.damping, length, -edge, cells])
+        table = np.ascontiguousarray(np.hstack([strain, *rest]))
+        return table, numbers, *law.model.arrays  # type: ignore[attr-defined]
+
+    def initial(self, angle: Array, pressures: Array) -> Array:
+        """Return the sliders at angles [rad] after a virgin straight joint, (rows, 2, elements)."""
+        sliders = np.zeros((len(angle), 2, self.plant.hysteresis.model.elements))  # type: ignore[attr-defined]
+        return self.friction(angle[:, None], pressures, sliders)[1]
+
+    def pull(self, angle: Array, pressures: Array, sliders: Array) -> tuple[Pull, Array]:
+        """Return the pull of pairs at angles [rad] and pressures [Pa], (rows, 2), and sliders."""
+        given, after = np.ascontiguousarray(angle), sliders.copy()
+        found = np.empty((3, len(given)))
+        pull_rows(*self._tables, given, np.ascontiguousarray(pressures), after, found)
+        return Pull(*found), after
+
+    def friction(self, angles: Array, pressures: Array, sliders: Array) -> tuple[Array, Array]:
+        """Return the torques of friction [N m] at angles in turn, (rows, n), and the sliders."""
+        given, after = np.ascontiguousarray(angles), sliders.copy()
+        torques = np.empty_like(given)
+        rub_rows(*self._tables, given, np.ascontiguousarray(pressures), after, torques)
+        return torques, after
+
+    # --- nominal point --------------------------------------------------------------------------
+
+    @cached_property
+    def stiffness(self) -> float:
+        """Stiffness [N m/rad] of the straight joint."""
+        return float(self.plant.stiffness_at(0.0))
+
+    @cached_property
+    def damping(self) -> float:
+        """Damping [N m s/rad] of the straight joint."""
+        muscle, lever = self.plant.muscle, self.plant.lever.rate(0.0)
+        viscous = muscle.viscosity / muscle.rest_length
+        pressures = self.pressures(np.array(0.0))
+        return float(self.plant.link.damping + viscous * np.sum(pressures * lever**2))
+
+
+@dataclass(frozen=True)
+class LinearMotion:
+    """Linear motion of n coupled joints about the straight ones over a control period.
+
+        M q'' + D q' + K q = torque
+
+    Attributes
+    ----------
+    a, b : ndarray, shapes (2 n, 2 n) and (2 n, n)
+        From angles [rad], rates [rad/s] and a torque [N m] that is held, to the next ones.
+    stiffness : float
+        ``K`` [N m/rad], the same for all joints.
+    """
+
+    a: Array
+    b: Array
+    stiffness: float
+
+    @classmethod
+    def make(cls, mass: Array, damping: Array, stiffness: float, period: float) -> "LinearMotion":
+        """Return the motion for a mass matrix [kg m2] and dampings [N m s/rad], (n,)."""
+        n, inverse = len(mass), np.linalg.inv(mass)
+        whole = np.zeros((3 * n, 3 * n))
+        whole[:n, n : 2 * n] = np.eye(n)
+        whole[n : 2 * n] = np.hstack([-stiffness * inverse, -inverse * damping, inverse])
+        moved = expm(whole * period)
+        return cls(moved[: 2 * n, : 2 * n], moved[: 2 * n, 2 * n :], stiffness)
+
+    def observer(self, noise: float, rate_noise: float, torque_noise: float) -> Array:
+        """Return the steady Kalman gains of angles, rates and disturbance torques, (3 n, n).
+
+        Noise of the sensed angles [rad], and steps of rates [rad/s] and of the disturbance [N m] in
+        a period (pannocchia2003: a disturbance model without offset).
+        """
+        n = self.b.shape[1]
+        a = np.block([[self.a, self.b], [np.zeros((n, 2 * n)), np.eye(n)]])
+        c = np.hstack([np.eye(n), np.zeros((n, 2 * n))])
+        steps = np.repeat([SMALL * noise, rate_noise, torque_noise], n)
+        sensed = noise**2 * np.eye(n)
+        cover = solve_discrete_are(a.T, c.T, np.diag(steps**2), sensed)
+        return np.asarray(cover @ c.T @ np.linalg.inv(c @ cover @ c.T + sensed))
+
+    def regulator(self, weight: float) -> Array:
+        """Return the gains [N m/rad, N m s/rad] of a linear-quadratic regulator, shape (n, 2 n).
+
+        A torque costs as much as the deviation that the stiffness holds with it, over ``weight``.
+        """
+        n = self.b.shape[1]
+        held = np.repeat([(weight * self.stiffness) ** 2, 0.0], n)
+        cost = solve_discrete_are(self.a, self.b, np.diag(held), np.eye(n))
+        left = np.eye(n) + self.b.T @ cost @ self.b
+        return np.asarray(np.linalg.solve(left, self.b.T @ cost @ self.a))
+
+
+SMALL = 1e-3
+"""Step of an angle in a period over the sensor's noise: the rate's is the cause of motion."""

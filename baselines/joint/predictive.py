@@ -1,0 +1,374 @@
+"""Predictive inverse of joints with a torque observer.
+
+    preview -> torques along the reference -> setpoints that exert them there
+    -> best rate-limited path -> setpoint, one dead time ahead
+
+This is model predictive control of the nominal joint or arm, solved by its structure, as for the
+single muscle (:mod:`baselines.positioning.predictive`). Friction is driven by the length of the
+muscles, that is, by the angle: along a previewed reference it is known in advance,
+
+    torque = M(0) r'' + D r' + weight(r) - friction(r) - d + P e + Q e'
+
+with the disturbance ``d`` and the deviation ``e`` of the joint from the reference when a setpoint
+takes effect. ``M`` couples the joints of an arm. The muscles exert the torque at the angle ``r``
+under a setpoint of the static law; the difference of both pressures, which changes by at most twice
+the rate limit, follows the best path through those setpoints
+(:mod:`baselines.predictive.rate_limited`). Both muscles of a joint may then be at their rate limit,
+which a path of the angle would not use.
+
+The motion of the nominal joint under the estimated pressures is compared with the sensed angle. A
+Kalman filter corrects angle, rate and ``d`` (pannocchia2003): payload, weight, a wrong force law
+and a wrong friction are torques. ``P`` and ``Q`` are those of a linear-quadratic regulator of the
+linear motion (anderson2007); with the exact model they are at rest. The regulators are those of a
+bank (:mod:`baselines.predictive.regulator`), one for all muscles, chosen by the sensed pressures.
+
+In an arm, joints whose setpoints are at the end of their range miss their reference; the others
+then make up for the error of the tool, by damped least squares (nakamura1986).
+
+A plant without muscles, or with friction driven by pressure, whose inverse is that of the setpoint,
+has the controller of :mod:`baselines.joint.disturbance_observer`, as designed.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from baselines.core.controller import Prediction, Reader, RowController, by_load, reader
+from baselines.core.entry import Bounds, Spec
+from baselines.joint.base import (
+    JOINT_ENTRY,
+    Gravity,
+    JointSignalMap,
+    JointView,
+    make_joint_signal_map,
+)
+from baselines.joint.disturbance_observer import JointObserver, make_joint_observer
+from baselines.joint.pair_model import LinearMotion, PairModel
+from baselines.predictive.preview import Preview, PreviewMemory
+from baselines.predictive.rate_limited import best_path
+from baselines.predictive.regulator import BankState, RegulatorBank
+from pam_envs.arrays import Array
+
+BLOCKS = np.array((1.0,) * 10 + (2.0,) * 6 + (4.0,) * 8)
+"""Control periods between the nodes of the horizon: 0.54 s."""
+ENDS = np.cumsum(BLOCKS)
+"""Nodes of the horizon [periods] from when a setpoint takes effect."""
+APART = 3.0
+"""Distance [periods] of the samples whose differences are the reference's rate and acceleration."""
+LEAD = 0.5
+"""Share of the damping that is compensated by a lead of the reference, the rest by its rate."""
+RATE_NOISE, TORQUE_NOISE = 0.02, 0.01
+"""Random steps in a period of the rate [rad/s] and of the disturbance [N m]."""
+FARTHEST, FASTEST = 0.05, 0.5
+"""Largest deviations of angle [rad] and rate [rad/s] that are fed back."""
+AT_END = 1e-4
+"""Distance [rad] of a setpoint from the end of its range that counts as at the end."""
+LEAST, MOST = 0.002, 0.1
+"""Smallest missed angle [rad] that the other joints make up for, and largest change of theirs."""
+SETTLING = 10.0
+"""Time constant [periods] of the missed angles."""
+TOOL = 0.1
+"""Length [m] that makes errors of the tool's direction and position comparable."""
+MAKE_UP = 0.02
+"""Damping of the least squares [m/rad]."""
+KNOBS: Bounds = {"lead": (0.1, 2.0), "observer": (0.1, 10.0), "feedback": (0.1, 6.0)}
+"""Factors on the lead, on the observer's noise of rate and disturbance, and on the regulator's
+weight of a deviation."""
+
+
+class PredictiveState(NamedTuple):
+    """State of the model, first axis n_env, and then n_joints.
+
+    Attributes
+    ----------
+    bank, seen
+        States of the regulators and of the preview.
+    pressure : ndarray, shape (n_env, n_joints, 2)
+        Estimated pressures [Pa] of the muscles.
+    sliders : ndarray, shape (n_env, n_joints, 2, elements)
+        State of the friction.
+    angle, rate, disturbance : ndarray, shape (n_env, n_joints)
+        Estimates [rad], [rad/s], [N m].
+    missed : ndarray, shape (n_env, n_joints)
+        Angles [rad] by which joints at the end of their range miss the reference.
+    """
+
+    bank: BankState
+    seen: Preview
+    pressure: Array
+    sliders: Array
+    angle: Array
+    rate: Array
+    disturbance: Array
+    missed: Array
+
+
+class Demand(NamedTuple):
+    """Reference at the nodes of the horizon, (n_env, n_joints, n_nodes), and what is to be exerted.
+
+    ``feedback``, shape (n_env, n_joints), is a torque [N m] that is added.
+    """
+
+    angle: Array
+    rate: Array
+    acceleration: Array
+    feedback: Array
+
+
+@dataclass(frozen=True)
+class JointPredictive(RowController):
+    """Predictive inverse; see the module.
+
+    Attributes
+    ----------
+    pressures : Reader
+        Reader of the sensed pressures, those of a joint side by side.
+    mass : callable
+        From a payload [kg] to the mass matrix [kg m2] of the straight joints.
+    damping : ndarray, shape (n_joints,)
+        Damping [N m s/rad] beside that of the muscles and of their link.
+    lead : float
+        Lead of the reference [s].
+    observer, feedback : ndarray, shapes (3 n_joints, n_joints) and (n_joints, 2 n_joints)
+        Gains of :class:`~baselines.joint.pair_model.LinearMotion`.
+    """
+
+    model: PairModel
+    signals: JointSignalMap
+    gravity: Gravity
+    pressures: Reader
+    memory: PreviewMemory
+    bank: RegulatorBank
+    mass: Callable[[float], Array]
+    damping: Array
+    lead: float
+    observer: Array
+    feedback: Array
+
+    def initial_state(self, observation: ArrayLike) -> PredictiveState:
+        """Return the state at rest at the present angles and setpoints."""
+        view = self.signals.read(observation)
+        held, still = self.model.pressures(view.set_point), np.zeros_like(view.angle)
+        sliders = self.model.initial(view.angle.ravel(), held.reshape(-1, 2))
+        return PredictiveState(
+            self.bank.start(held.ravel()),
+            self.memory.start(view.samples),
+            held,
+            sliders.reshape(*held.shape, -1),
+            view.angle,
+            still,
+            still,
+            still,
+        )
+
+    def respond(self, observation: ArrayLike, state: PredictiveState) -> Prediction:
+        """Return the action and the next state."""
+        view = self.signals.read(observation)
+        now = self.observed(observation, view, state)
+        set_point, missed = self._set_points(view, now)
+        bank = self.bank.advance(now.bank, self.model.pressures(set_point).ravel())
+        return self.signals.write(set_point, observation), now._replace(bank=bank, missed=missed)
+
+    def observed(
+        self, observation: ArrayLike, view: JointView, state: PredictiveState
+    ) -> PredictiveState:
+        """Return the state with what an observation shows of reference and plant."""
+        sensed = self.pressures.rows(observation).T
+        bank = self.bank.alike(self.bank.observe(state.bank, sensed.ravel()), sensed.shape[1])
+        pressure = self.bank.now(bank).reshape(state.pressure.shape)
+        expected = self._moved(view, state, pressure[None], np.ones((1, len(sensed))))
+        n = view.angle.shape[1]
+        more = _product(self.observer, view.angle - expected.angle)
+        angle = expected.angle + more[:, :n]
+        flat = angle.reshape(-1, 1), pressure.reshape(-1, 2), _flat(state.sliders)
+        sliders = self.model.friction(*flat)[1].reshape(state.sliders.shape)
+        return expected._replace(
+            bank=bank,
+            seen=self.memory.add(state.seen, view.samples),
+            sliders=sliders,
+            angle=angle,
+            rate=expected.rate + more[:, n : 2 * n],
+            disturbance=state.disturbance + more[:, 2 * n :],
+        )
+
+    def _moved(
+        self, view: JointView, state: PredictiveState, stages: Array, times: Array
+    ) -> PredictiveState:
+        """Return the state after stages at whose ends the muscles have new pressures [Pa].
+
+        ``stages`` has the shape (n_stages, n_env, n_joints, 2), ``times`` [periods] (n_stages,
+        n_env). The middle of a stage is implicit: stable for every stiffness.
+        """
+        angle, rate, was, sliders = state.angle, state.rate, state.pressure, _flat(state.sliders)
+        mass, unit = self._masses(view.payload), np.eye(angle.shape[1])
+        for stage, time in zip(stages, times, strict=True):
+            h = (time * self.bank.period)[:, None]
+            ahead, middle = angle + 0.5 * h * rate, 0.5 * (was + stage)
+            found, slid = self.model.pull(ahead.ravel(), middle.reshape(-1, 2), sliders)
+            torque, stiffness, damping = (part.reshape(angle.shape) for part in found)
+            damping = damping + self.damping
+            net = torque + state.disturbance - self.gravity.torque(ahead, view.payload)
+            left = mass + (0.5 * h * damping + 0.25 * h * h * stiffness)[..., None] * unit
+            gained = _solved(left, h * (net - damping * rate))
+            angle, rate = angle + h * (rate + 0.5 * gained), rate + gained
+            moving = np.repeat(time > 0.0, angle.shape[1])[:, None, None]
+            sliders, was = np.where(moving, slid, sliders), stage
+        shaped = sliders.reshape(state.sliders.shape)
+        return state._replace(angle=angle, rate=rate, pressure=was, sliders=shaped)
+
+    def _masses(self, payload: Array) -> Array:
+        """Return the mass matrices [kg m2] of the rows, shape (n_env, n_joints, n_joints)."""
+
+        def repeated(load: float, rows: Array) -> Array:
+            return np.repeat(self.mass(load)[None], len(rows), axis=0)
+
+        return np.asarray(by_load(payload, repeated, payload))
+
+    def _set_points(self, view: JointView, now: PredictiveState) -> tuple[Array, Array]:
+        """Return the setpoints [rad] and the missed angles [rad], shape (n_env, n_joints)."""
+        shape, period = view.angle.shape, self.bank.period
+        arrival = self.bank.arrival(now.bank)
+        stages = arrival.pressures.reshape(-1, *shape, 2)
+        delay, rate, lag = (
+            part.reshape(*shape, 2)[..., 0] for part in (arrival.delay, arrival.rate, arrival.lag)
+        )
+        count, whole = np.arange(len(stages))[:, None], np.floor(delay[:, 0])
+        first = np.where(count == 0, delay[:, 0] - whole, 1.0)
+        then = self._moved(view, now, stages, np.where(count <= whole, first, 0.0))
+        demand = self._demand(now, then, delay[:, 0])
+        missed = self._missed(view, now)
+        demand = demand._replace(angle=demand.angle + self._made_up(view, missed)[..., None])
+        later = then.pressure.reshape(-1, 2)
+        wanted = self.model.difference(self._levels(view, then, demand)).reshape(len(later), -1)
+        weight, reach = np.tile(BLOCKS, (len(later), 1)), 2.0 * period * rate.reshape(-1, 1)
+        path = best_path(later[:, 0] - later[:, 1], wanted, weight, reach * BLOCKS)
+        found = self.model.command(later, path[:, 0], lag.ravel(), rate.ravel(), period)
+        return found.reshape(shape), missed
+
+    def _demand(self, now: PredictiveState, then: PredictiveState, delay: Array) -> Demand:
+        """Return the demand after a delay [periods], (n_env,), when the joints are at ``then``."""
+        period = self.bank.period
+        start = (now.seen.step + delay)[:, None]
+        at = start + ENDS + self.lead / period
+        times = (at - APART, at, at + APART, start - 1.0, start, start + 1.0)
+        samples, _ = self.memory.read(now.seen, np.concatenate(times, axis=1))
+        before, angle, after, near = np.split(samples, np.arange(1, 4) * len(ENDS), axis=2)
+        ahead = APART * period
+        off = near[..., 1] - then.angle
+        slow = (near[..., 2] - near[..., 0]) / (2.0 * period) - then.rate
+        fed = np.clip(off, -FARTHEST, FARTHEST), np.clip(slow, -FASTEST, FASTEST)
+        return Demand(
+            angle,
+            (after - before) / (2.0 * ahead),
+            (before - 2.0 * angle + after) / ahead**2,
+            _product(self.feedback, np.concatenate(fed, axis=1)),
+        )
+
+    def _levels(self, view: JointView, then: PredictiveState, demand: Demand) -> Array:
+        """Return the setpoints [rad] that exert the torques of a demand at its nodes."""
+        shape, model = demand.angle.shape, self.model
+        flat = demand.angle.reshape(-1, shape[2])
+        rubs, _ = model.friction(flat, then.pressure.reshape(-1, 2), _flat(then.sliders))
+        nodes = np.moveaxis(demand.angle, 2, 1)
+        payload = np.repeat(view.payload, shape[2])
+        weight = self.gravity.torque(nodes.reshape(-1, shape[1]), payload).reshape(nodes.shape)
+        torque = np.moveaxis(weight, 1, 2) - rubs.reshape(shape)
+        torque = torque + (demand.feedback - then.disturbance)[..., None]
+        damping = self.damping + model.damping - self.lead * model.stiffness
+        torque = torque + damping[:, None] * demand.rate
+        pushed = self._masses(view.payload)[..., None] * demand.acceleration[:, None]
+        torque = torque + np.add.reduce(pushed, axis=2)
+        bend = 0.5 * self.lead**2 * demand.acceleration
+        return demand.angle - bend + self.gravity.shift_of(demand.angle, torque)
+
+    def _missed(self, view: JointView, now: PredictiveState) -> Array:
+        """Return the filtered angles [rad] by which joints at the end of their range are short."""
+        low, high = self.model.plant.angle_range
+        off = np.clip(now.angle - view.reference, -MOST, MOST)
+        ends = (view.set_point <= low + AT_END) | (view.set_point >= high - AT_END)
+        short = np.where(ends & (off * view.set_point < 0.0), off, 0.0)
+        return np.asarray(now.missed + (short - now.missed) / SETTLING)
+
+    def _made_up(self, view: JointView, missed: Array) -> Array:
+        """Return the change of the references [rad] with which the tool is where it should be."""
+        chain, short = getattr(self.model.plant, "chain", None), np.abs(missed) > LEAST
+        if chain is None or not short.any():
+            return np.zeros_like(missed)
+        scale = np.repeat([1.0, TOOL], 3)[:, None]
+        jacobian = scale * chain.jacobian(view.reference)
+        own = np.where(short[:, None], 0.0, jacobian)
+        error = np.add.reduce(jacobian * np.where(short, missed, 0.0)[:, None], axis=2)
+        square = np.add.reduce(own[..., None] * own[:, :, None], axis=1)
+        left = square + MAKE_UP**2 * np.eye(missed.shape[1])
+        more = -_solved(left, np.add.reduce(own * error[..., None], axis=1))
+        return np.clip(more, -MOST, MOST)
+
+
+def _flat(sliders: Array) -> Array:
+    """Return the sliders with one row for each joint, shape (n_env n_joints, 2, elements)."""
+    return sliders.reshape(-1, *sliders.shape[2:])
+
+
+def _product(matrix: Array, rows: Array) -> Array:
+    """Return ``matrix @ row`` for every row, in an order that depends on no other row."""
+    return np.asarray(np.add.reduce(matrix * rows[:, None], axis=2))
+
+
+def _solved(left: Array, right: Array) -> Array:
+    """Return the solutions of a system for each row."""
+    return np.asarray(np.linalg.solve(left, right[..., None])[..., 0])
+
+
+def make_joint_predictive(spec: Spec[Any]) -> JointPredictive | JointObserver:
+    """Return the controller of a joint or an arm."""
+    plant, period = spec.plant, spec.plant.control_period
+    if not PairModel.fits(plant):
+        return make_joint_observer(replace(spec, knobs={}))
+    signals, model = make_joint_signal_map(spec.signals, spec.actions), PairModel(plant)
+    names = [""] if plant.stages == 1 else [str(k) for k in range(plant.stages)]
+    muscles = [f"pressure_{name}{muscle}" for name in names for muscle in "ab"]
+    mass, damping = cache(_mass_of(plant)), np.zeros(plant.stages)
+    if plant.stages > 1:
+        damping = plant.arm.damping_factor * np.array(plant.joint_damping)
+    motion = LinearMotion.make(mass(0.0), model.damping + damping, model.stiffness, period)
+    noise, pace = math.hypot(plant.angle.noise, plant.angle.resolution / 12**0.5), "observer"
+    steps = (spec.knob(pace) * RATE_NOISE, spec.knob(pace) * TORQUE_NOISE)
+    return JointPredictive(
+        model,
+        signals,
+        Gravity(plant),
+        reader(spec.signals, muscles),
+        PreviewMemory.make(np.array([round(time / period) for time in signals.times])),
+        RegulatorBank.make(plant, adaptive=True),
+        mass,
+        damping,
+        spec.knob("lead") * LEAD * model.damping / model.stiffness,
+        motion.observer(noise, *steps),
+        motion.regulator(spec.knob("feedback")),
+    )
+
+
+def _mass_of(plant: Any) -> Callable[[float], Array]:
+    """Return the mass matrix [kg m2] of straight joints as a function of the payload [kg]."""
+    if plant.stages > 1:
+        return lambda payload: plant.chain.mass_matrix(np.zeros(plant.stages), payload)
+    link = plant.link
+    return lambda payload: np.array([[link.inertia + payload * link.length**2]])
+
+
+ENTRIES = {
+    "joint_predictive": JOINT_ENTRY(
+        "predictive control of the nominal joint or arm: torques along the previewed reference,"
+        " best rate-limited path, torque observer, estimated regulator",
+        make=make_joint_predictive,
+        preview=True,
+        feedback=True,
+        citation="bertsekas2017; pannocchia2003; anderson2007; nakamura1986; magill1965",
+        knobs=KNOBS,
+    ),
+}
