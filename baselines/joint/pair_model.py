@@ -181,14 +181,15 @@ class PairModel:
         [s] before; lag [s] and rate [Pa/s] those of the regulators, shape (rows,).
         """
         found = np.empty_like(wanted)
-        rows: Any = [np.ascontiguousarray(part) for part in (later, wanted, lag, rate)]
-        command_rows(*self._set_points, *rows, period, found)
+        states = (np.ascontiguousarray(later), np.ascontiguousarray(wanted))
+        laws = (np.ascontiguousarray(lag), np.ascontiguousarray(rate))
+        command_rows(*self._set_points, *states, *laws, period, found)
         return found
 
     # --- torque ---------------------------------------------------------------------------------
 
     @cached_property
-    def _tables(self) -> Any:
+    def _tables(self) -> tuple[Array, Array, Array, Array, float, float]:
         plant, muscle, law = self.plant, self.plant.muscle, self.plant.hysteresis
         edge, length = plant.largest_angle + BEYOND, muscle.rest_length
         angles = np.linspace(-edge, edge, POINTS)
