@@ -76,7 +76,7 @@ TOOL = 0.1
 """Length [m] that makes errors of the tool's direction and position comparable."""
 MAKE_UP = 0.02
 """Damping of the least squares [m/rad]."""
-KNOBS: Bounds = {"lead": (0.1, 2.0), "observer": (0.1, 10.0), "feedback": (0.1, 6.0)}
+KNOBS: Bounds = {"lead": (0.1, 4.0), "observer": (0.1, 10.0), "feedback": (0.1, 6.0)}
 """Factors on the lead, on the observer's noise of rate and disturbance, and on the regulator's
 weight of a deviation."""
 
@@ -111,10 +111,12 @@ class PredictiveState(NamedTuple):
 class Demand(NamedTuple):
     """Reference at the nodes of the horizon, (n_env, n_joints, n_nodes), and what is to be exerted.
 
+    ``led`` is the angle [rad] a lead later, and so are rate [rad/s] and acceleration [rad/s2].
     ``feedback``, shape (n_env, n_joints), is a torque [N m] that is added.
     """
 
     angle: Array
+    led: Array
     rate: Array
     acceleration: Array
     feedback: Array
@@ -242,7 +244,8 @@ class JointPredictive(RowController):
         then = self._moved(view, now, stages, np.where(count <= whole, first, 0.0))
         demand = self._demand(now, then, delay[:, 0])
         missed = self._missed(view, now)
-        demand = demand._replace(angle=demand.angle + self._made_up(view, missed)[..., None])
+        more = self._made_up(view, missed)[..., None]
+        demand = demand._replace(angle=demand.angle + more, led=demand.led + more)
         later = then.pressure.reshape(-1, 2)
         wanted = self.model.difference(self._levels(view, then, demand)).reshape(len(later), -1)
         weight, reach = np.tile(BLOCKS, (len(later), 1)), 2.0 * period * rate.reshape(-1, 1)
@@ -255,17 +258,19 @@ class JointPredictive(RowController):
         period = self.bank.period
         start = (now.seen.step + delay)[:, None]
         at = start + ENDS + self.lead / period
-        times = (at - APART, at, at + APART, start - 1.0, start, start + 1.0)
+        around = start + np.array([-1.0, 0.0, 1.0])
+        times = (start + ENDS, at - APART, at, at + APART, around)
         samples, _ = self.memory.read(now.seen, np.concatenate(times, axis=1))
-        before, angle, after, near = np.split(samples, np.arange(1, 4) * len(ENDS), axis=2)
+        angle, before, led, after, near = np.split(samples, np.arange(1, 5) * len(ENDS), axis=2)
         ahead = APART * period
         off = near[..., 1] - then.angle
         slow = (near[..., 2] - near[..., 0]) / (2.0 * period) - then.rate
         fed = np.clip(off, -FARTHEST, FARTHEST), np.clip(slow, -FASTEST, FASTEST)
         return Demand(
             angle,
+            led,
             (after - before) / (2.0 * ahead),
-            (before - 2.0 * angle + after) / ahead**2,
+            (before - 2.0 * led + after) / ahead**2,
             _product(self.feedback, np.concatenate(fed, axis=1)),
         )
 
@@ -284,7 +289,7 @@ class JointPredictive(RowController):
         pushed = self._masses(view.payload)[..., None] * demand.acceleration[:, None]
         torque = torque + np.add.reduce(pushed, axis=2)
         bend = 0.5 * self.lead**2 * demand.acceleration
-        return demand.angle - bend + self.gravity.shift_of(demand.angle, torque)
+        return demand.led - bend + self.gravity.shift_of(demand.angle, torque)
 
     def _missed(self, view: JointView, now: PredictiveState) -> Array:
         """Return the filtered angles [rad] by which joints at the end of their range are short."""

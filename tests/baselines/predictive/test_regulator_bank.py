@@ -49,3 +49,13 @@ def test_regulator_is_identified_from_the_sensed_pressure(dead_time, slew_rate):
     assert bank.rate[best] == pytest.approx(slew_rate, rel=0.25)
     nominal = abs(state.pressure[0, 0] - record[-1])
     assert abs(bank.now(state)[0] - record[-1]) < 0.3 * nominal
+
+
+def test_alike_regulators_share_their_deviations():
+    bank = RegulatorBank.make(PLANT, adaptive=True)
+    state = bank.start(np.array([1e5, 1e5, 2e5, 2e5]))
+    state = bank.observe(state, np.array([1e5, 1.02e5, 2e5, 2e5]))
+    shared = bank.alike(state, 2).deviation
+    np.testing.assert_array_equal(shared[0], shared[1])
+    np.testing.assert_allclose(shared[0], 0.5 * (state.deviation[0] + state.deviation[1]))
+    np.testing.assert_array_equal(shared[2:], state.deviation[2:])
