@@ -6,6 +6,8 @@ from benchmarks.identity import audit
 from benchmarks.runs import rows, verified
 from benchmarks.runs.verify import void
 
+pytestmark = pytest.mark.xdist_group("committed rows")  # rows are read once
+
 CHEAP = {
     "positioning_disturbed": ("inverse_pid", "pid_tuned", "table"),
     "knee_walk_nominal": ("knee_inverse", "knee_hold", "knee_ltr"),
