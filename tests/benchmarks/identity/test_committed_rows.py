@@ -18,11 +18,6 @@ CHEAP = {
 """A track of every family of plants, and controllers that are quickly designed."""
 
 
-@pytest.fixture(scope="module")
-def committed():
-    return rows.load_all()
-
-
 def test_every_row_is_in_its_round(committed):
     assert committed
     assert [row["row"] for row in committed if not audit.in_last_round(row)] == []
