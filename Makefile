@@ -98,6 +98,7 @@ build/docs-extra/playground: $(READY)
 
 docs: $(VENV)/.docs build/docs-extra/board build/docs-extra/playground ## Build the documentation site into build/docs
 	$(BIN)/python docs/make_notebooks.py --check
+	@echo "Building build/docs; the first time, and after a change of a tutorial, it is executed: up to ten minutes"
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --doctree-dir build/docs-doctrees --conf-dir docs . build/docs
 
 docs-check: docs ## Look for broken links and errors of the built site in a browser

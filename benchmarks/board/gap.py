@@ -22,6 +22,7 @@ from benchmarks.board.words import short_env
 from benchmarks.bounds.run import Bounds
 from benchmarks.runs.cells import AUDIT, PUBLIC
 from benchmarks.runs.rows import Row
+from benchmarks.scenarios import kinds
 from benchmarks.scoring import statistics
 from benchmarks.scoring.metrics import headline_of
 from benchmarks.scoring.statistics import Interval
@@ -61,17 +62,12 @@ improvement; *matched* is the best other controller with the same use of preview
 
 @lru_cache(maxsize=1)
 def _lists() -> Mapping[str, Any]:
-    return yaml_file.read(FILE, "lists of controllers, tracks and reasons")
+    return yaml_file.read(FILE, "lists of controllers and reasons")
 
 
 def beyond() -> tuple[str, ...]:
     """Return the names of the controllers beyond the papers."""
     return tuple(_lists()["beyond"])
-
-
-def kinds() -> tuple[str, ...]:
-    """Return the endings of tracks of whose plants the controllers do not have the true model."""
-    return tuple(_lists()["kinds"])
 
 
 def reasons() -> dict[str, str]:
@@ -159,7 +155,7 @@ def gap_of_best(
 def page_text(tracks: Mapping[str, Track], bounds: Mapping[str, Bounds]) -> str:
     """Return the page as Markdown."""
     found = {name: gap_of_best(rows, bounds.get(name)) for name, rows in tracks.items()}
-    nominal = {name: rows for name, rows in tracks.items() if name.endswith("_nominal")}
+    nominal = {n: rows for n, rows in tracks.items() if kinds.is_of(n, kinds.NOMINAL)}
     gaps = {name: found[name] for name in nominal}
     lines = [INTRODUCTION, "## Nominal tracks", ""]
     lines += [*_gaps(gaps, bounds), "", *_reasons(gaps)]
@@ -285,9 +281,11 @@ def _gains(tracks: Mapping[str, Track]) -> list[str]:
         lines.append(cells)
     counts = {
         kind: [
-            made is not None and made.holds for name, made in gains.items() if name.endswith(kind)
+            made is not None and made.holds
+            for name, made in gains.items()
+            if kinds.is_of(name, kind)
         ]
-        for kind in kinds()
+        for kind in kinds.NOT_THE_MODEL
     }
     words = ", ".join(
         f"{sum(held)} of {len(held)} {kind.replace('_', '-')} tracks"

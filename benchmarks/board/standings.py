@@ -8,6 +8,7 @@ from scipy import stats
 
 from benchmarks.board import accessors as views
 from benchmarks.runs.rows import Row
+from benchmarks.scenarios import kinds
 from benchmarks.scoring import statistics
 from benchmarks.scoring.statistics import Interval
 
@@ -55,7 +56,7 @@ def tracks(rows: Sequence[Row]) -> dict[str, Track]:
 
     def order(name: str) -> tuple[bool, str, bool, str]:  # positioning first
         env = views.env_of(grouped[name][0])
-        return "Positioning" not in env, env, "nominal" not in name, name
+        return "Positioning" not in env, env, not kinds.is_of(name, kinds.NOMINAL), name
 
     return {name: ordered(grouped[name]) for name in sorted(grouped, key=order)}
 

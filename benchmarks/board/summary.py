@@ -22,6 +22,7 @@ from benchmarks.board.words import (
 )
 from benchmarks.bounds.run import Bounds
 from benchmarks.runs.rows import Row
+from benchmarks.scenarios import kinds
 from benchmarks.scoring.metrics import headline_of
 
 Tracks = Mapping[str, Track]
@@ -62,8 +63,8 @@ order.
 """
 
 
-KINDS = ("nominal", "random", "wrong_model", "everyday")
-"""Parts of the names of the tracks in the first table."""
+KINDS = (kinds.NOMINAL, kinds.DRAWN, kinds.WRONG_MODEL, kinds.EVERYDAY)
+"""Kinds of the tracks in the first table."""
 SIDES = ("paper's controller", "best classical", "best learned", "oracle")
 """Columns of the first table."""
 
@@ -132,7 +133,8 @@ def best_learned(rows: Sequence[Row]) -> Row | None:
 
 def nominal(tracks: Tracks) -> dict[str, Best]:
     """Return the best of each environment's nominal track (of all tracks if none is nominal)."""
-    chosen = {name: rows for name, rows in tracks.items() if "nominal" in name} or dict(tracks)
+    found = {name: rows for name, rows in tracks.items() if kinds.is_of(name, kinds.NOMINAL)}
+    chosen = found or dict(tracks)
     return {name: best_of(name, rows, NO_BOUNDS) for name, rows in chosen.items()}
 
 
@@ -161,10 +163,8 @@ def _best_controllers(found: Mapping[str, Best]) -> list[str]:
     lines = []
     for kind in KINDS:
         for name, best in found.items():
-            _, found_kind, tail = name.partition(f"_{kind}")
-            if found_kind:
-                words = f"{kind}{tail}".replace("_", " ")
-                where = f"`{short_env(best.env)}`<br>{words}"
+            if kinds.is_of(name, kind):
+                where = f"`{short_env(best.env)}`<br>{kind.replace('_', ' ')}"
                 rows = (best.paper, best.classical, best.learned)
                 lines.append([where, *map(_scores, rows), _bound(best)])
     if not lines:
@@ -226,9 +226,8 @@ def excerpt(all_rows: Sequence[Row], bounds: Mapping[str, Bounds] = NO_BOUNDS) -
     """Return the table of README: RMS on the nominal tracks and on those with drawn plants."""
     tracks, lines = standings.tracks(all_rows), []
     for name in tracks:
-        head, nominal_track, _ = name.partition("_nominal")
-        drawn = next((one for one in tracks if one.startswith(f"{head}_random")), None)
-        if not nominal_track or drawn is None:
+        drawn = kinds.counterpart(name, kinds.NOMINAL, kinds.DRAWN)
+        if drawn is None or drawn not in tracks:
             continue
         pair = [name, drawn]
         found = [best_of(one, tracks[one], bounds) for one in pair]

@@ -295,12 +295,12 @@ def _after(made: Numbers) -> str:
 def write(
     records: Sequence[Mapping[str, Any]], folder: Path, arguments: str = "", **beside: Any
 ) -> list[Path]:
-    """Write ``diagnosis.md``, ``diagnosis.json`` and ``diagnosis.png`` and return their paths.
+    """Write ``diagnosis.md``, ``.json.xz`` and ``.png`` and return their paths.
 
     ``arguments`` are those of the command, ``beside`` the further arguments of :func:`figures`.
     """
     made = figures(records, **beside)
-    paths = [folder / f"diagnosis.{kind}" for kind in ("md", "json", "png")]
+    paths = [folder / f"diagnosis.{kind}" for kind in ("md", "json.xz", "png")]
     write_text(paths[0], page(made, arguments))
     lines = [counting.line(Answer.of(record)) for record in records]
     write_record(paths[1], {"schema": 1, "arguments": arguments, "figures": made, "cases": lines})

@@ -1,12 +1,11 @@
 """Comparison with ``mujoco.sysid`` on a mass-spring-damper with hidden dry friction.
 
 ``python -m benchmarks.head_to_head.run`` runs both tools on the same recordings and prints the
-tables; ``--write`` also writes ``docs/head_to_head.md`` and ``results/head_to_head.json``. Without
-the extra ``mujoco`` only our diagnosis is run.
+tables; ``--write`` also writes ``docs/head_to_head.md`` and ``results/head_to_head.json.xz``.
+Without the extra ``mujoco`` only our diagnosis is run.
 """
 
 import dataclasses
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from benchmarks.head_to_head.page import page
 from benchmarks.head_to_head.rig import NOISE, PERIOD, Oscillator, another, campaign
 from benchmarks.identity.hashing import plain
 from benchmarks.runs.provenance import packages
+from benchmarks.runs.store import read_json, write_json
 from pam_envs.arrays import Array
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.verdict import Decision, decide
@@ -28,7 +28,7 @@ from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
 from pam_envs.diagnosis.fit.least_squares import Problem, column_of
 
 HERE = Path(__file__).parents[1]
-RESULTS = HERE / "results" / "head_to_head.json"
+RESULTS = HERE / "results" / "head_to_head.json.xz"
 PAGE = HERE.parent / "docs" / "head_to_head.md"
 FRICTIONS = (0.0, 0.5, 1.0, 2.0)  # hidden dry friction [N]
 OTHERS: dict[str, dict[str, float]] = {
@@ -141,7 +141,7 @@ def _rms(values: Array) -> float:
 
 def written() -> dict[str, Any]:
     """Return the stored results."""
-    return dict(json.loads(RESULTS.read_text(encoding="utf-8")))
+    return dict(read_json(RESULTS))
 
 
 def main(
@@ -153,7 +153,7 @@ def main(
         rigs: Drawn rigs for every friction.
         others: Drawn rigs for every other hidden effect.
         friction: Rigs on which MuJoCo also fits friction, which takes most of its time.
-        write: Also write ``results/head_to_head.json`` and ``docs/head_to_head.md``.
+        write: Also write ``results/head_to_head.json.xz`` and ``docs/head_to_head.md``.
     """
     from rich.progress import track
 
@@ -174,7 +174,7 @@ def main(
     text = page(result)
     print(text)
     if write:
-        RESULTS.write_text(json.dumps(plain(result), indent=1) + "\n", encoding="utf-8")
+        write_json(RESULTS, plain(result))
         PAGE.write_text(text, encoding="utf-8")
     return result
 

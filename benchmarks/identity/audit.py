@@ -8,6 +8,10 @@ bytes (less their last eleven bits, so that every JSON reader represents the num
 where *frozen* is the digest of the task and of all artefacts of the track, and the salt is drawn
 after them. Rounds are only added to ``rounds.json``; a controller or task that changed since the
 last round is self-reported until the next one.
+
+The last round of a track holds the frozen identities whole, because changes are told from them. Of
+an earlier one the file keeps their digests, from which the entries are counted; the commit that
+added the round holds them whole.
 """
 
 import datetime
@@ -18,7 +22,7 @@ import secrets
 import subprocess
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -38,6 +42,7 @@ PER_SCENARIO = 2
 """Smallest number of audit episodes per scenario: an interval needs the scatter within one."""
 KEPT = ("frozen", "salt", "drawn")
 """Entries of a round, from which its seeds follow, that no commit may change."""
+DIGEST = "digest"
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,11 @@ class Round:
     @staticmethod
     def _seed(text: str) -> int:
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") >> 11
+
+    def replaced(self) -> "Round":
+        """Return the round as it is kept after a later one of its track: with digests alone."""
+        entrants = {name: {DIGEST: held[DIGEST]} for name, held in self.entrants.items()}
+        return replace(self, task={DIGEST: self.task[DIGEST]}, entrants=entrants)
 
     def changes(self, entrant: Entrant, track: ScenarioSet) -> list[str]:
         """Return the differences of the present task and controller from the frozen ones."""
@@ -198,6 +208,13 @@ def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
             drawn=datetime.datetime.now(datetime.UTC).date().isoformat(),
             commit=provenance.commit(),
         )
-        text = json.dumps({"rounds": [asdict(entry) for entry in [*rounds(), drawn]]}, indent=1)
-        write_text(FILE, text + "\n")
+        write_text(FILE, text_of([*rounds(), drawn]))
     return drawn
+
+
+def text_of(all_rounds: Sequence[Round]) -> str:
+    """Return the content of the file: a line for each round, those that were replaced reduced."""
+    final = {entry.track: entry for entry in all_rounds}.values()
+    kept = [entry if entry in final else entry.replaced() for entry in all_rounds]
+    lines = ",\n".join(json.dumps(asdict(entry), separators=(",", ":")) for entry in kept)
+    return f'{{"rounds": [\n{lines}\n]}}\n'

@@ -37,6 +37,7 @@ from baselines.core.entry import Bounds, Knobs, Plants
 from baselines.core.tuned import Tuned, tuned_name
 from benchmarks.identity.hashing import digest
 from benchmarks.runs import cells, controllers
+from benchmarks.scenarios import kinds
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scenarios.scenario_env import make_env, model_of
@@ -53,7 +54,6 @@ MOST_RATIO = 100.0  # upper limit of the excess of one cost
 STORAGE = controllers.ROOT / "runs" / "tuning.db"
 UNTUNED = "untuned"
 SPLIT = "tuning"
-PARTS: Mapping[Plants, str] = {"nominal": "_nominal", "drawn": "_random"}  # of names of tracks
 DIGITS = 4  # significant digits of a factor
 
 
@@ -105,12 +105,10 @@ def job_of(controller: str, env: str = "", **how: Any) -> Job:
 
 def track_of(env: str, plants: Plants = "nominal") -> ScenarioSet:
     """Return the track of an environment whose plant is the nominal model, or drawn around it."""
-    made, part = scenarios.available().values(), PARTS[plants]
-    found = [track for track in made if track.env == env and part in track.name]
+    made, kind = scenarios.available().values(), kinds.TUNED_ON[plants]
+    found = [track for track in made if track.env == env and kinds.is_of(track.name, kind)]
     if len(found) != 1:
-        raise ValueError(
-            f"{env} has {len(found)} tracks named ...{part}...; it needs one to tune on"
-        )
+        raise ValueError(f"{env} has {len(found)} tracks named ..._{kind}; it needs one to tune on")
     return found[0]
 
 

@@ -3,7 +3,6 @@
 import contextlib
 import hashlib
 import pickle
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -46,13 +45,12 @@ class _Locator(caching._CacheLocator):
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
-        """Return a locator, or None where nothing can be written."""
+        """Return a locator, or None without a folder; one that is only read is used, too."""
         try:
             make_folder(FOLDER)
-            with tempfile.TemporaryFile(dir=FOLDER):
-                return cls(py_file)
         except OSError:
             return None
+        return cls(py_file)
 
 
 class _CacheImpl(caching.CompileResultCacheImpl):
@@ -271,7 +269,7 @@ def compiled(
         if not for_python:
             return njit(**_CALLEE)(made)  # type: ignore[no-any-return]
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
-        with contextlib.suppress(RuntimeError):  # without a place to write nothing is kept
+        with contextlib.suppress(RuntimeError):  # without a folder nothing is kept
             dispatcher._cache = _Cache(made)
         return dispatcher  # type: ignore[no-any-return]
 

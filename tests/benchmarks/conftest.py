@@ -4,14 +4,21 @@ import board_fakes
 import pytest
 import yaml
 
+from benchmarks.board import leaderboard
 from benchmarks.identity import artefacts, audit, tasks
-from benchmarks.runs import controllers
+from benchmarks.runs import controllers, rows
 from benchmarks.scenarios import scenario as scenarios
 
 CONTENT = board_fakes.CONTENT | {
     "name": "short",
     "grid": {"hysteresis": ["maxwell_slip"], "reference": ["steps", "sines"]},
 }
+
+
+@pytest.fixture(scope="session")
+def committed():
+    """The rows of this checkout, as the board shows them."""
+    return leaderboard.load(rows.RESULTS)
 
 
 @pytest.fixture(autouse=True)

@@ -1,11 +1,11 @@
 """Page, statistics and figure of the diagnosis benchmark."""
 
-import json
 from typing import Any
 
 from diagnosis_fakes import counted, loop, record, sample, trace
 
 from benchmarks.diagnosis.report import figures, page, targets, write
+from benchmarks.runs.store import read_record
 from tests.diagnosis.hidden import EFFECTS
 
 
@@ -40,10 +40,10 @@ def test_page_shows_figure_target_and_number():
 def test_same_records_give_same_files(tmp_path):
     first = write(sample(), tmp_path / "a", "--chosen tune")
     second = write(sample(), tmp_path / "b", "--chosen tune")
-    assert [path.name for path in first] == ["diagnosis.md", "diagnosis.json", "diagnosis.png"]
+    assert [path.name for path in first] == ["diagnosis.md", "diagnosis.json.xz", "diagnosis.png"]
     for one, other in zip(first, second, strict=True):
         assert one.read_bytes() == other.read_bytes()
-    content = json.loads(first[1].read_text())
+    content = read_record(first[1])
     assert len(content["cases"]) == len(sample())
     assert content["cases"][0] == "single 1 creep@2.00: named creep (trace 0.10, held out 1.05)"
     assert counted(content["figures"]["right_first"]) == (3, 5)

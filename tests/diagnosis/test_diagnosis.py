@@ -20,7 +20,7 @@ from pam_envs.plants.core.plant import UnstableParameters
 from tests.diagnosis import hidden
 from tests.diagnosis.conftest import needs_kernels, recorded
 
-pytestmark = needs_kernels
+pytestmark = [needs_kernels, pytest.mark.xdist_group("diagnosis")]  # one diagnosis for all
 
 
 @pytest.fixture(scope="module")

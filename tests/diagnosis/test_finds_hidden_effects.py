@@ -27,7 +27,7 @@ POLYNOMIAL = "polynomial_shift_bouc_wen_overdamped"
 BUMPY = "bumpy_map_preisach_dead_time"
 """Rigs of other laws, friction and regulators, whose clock and start are unknown."""
 SINGLE = [
-    Case("single", SEED + k, (name,), (SIZE,))
+    Case("single", SEED + k, (name,), (SIZE,), campaign="short")
     for k, name in (
         (1, "creep"),
         (4, "hysteresis_drive"),

@@ -116,6 +116,7 @@ def main() -> None:
     if program is None:
         print(f"no browser here: install one of {', '.join(NAMES)} to check the pages in it")
     else:
+        print(f"loading {len(pages(folder))} pages in {program}, some seconds each", flush=True)
         faults += faults_in_browser(pages(folder), program)
     print(f"{len(pages(folder))} pages, {len(faults)} faults", *faults, sep="\n")
     sys.exit(bool(faults))

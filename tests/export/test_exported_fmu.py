@@ -11,6 +11,8 @@ import pytest
 from benchmarks.exported import FmuModel, differing, expected, run_fmu
 from pam_envs.export.fmu import export_fmu
 
+pytestmark = pytest.mark.xdist_group("exported_fmu")  # each unit is built once
+
 fmpy = pytest.importorskip("fmpy")
 
 NAMES = ("{}.fmu", "{}_fmi2.fmu")

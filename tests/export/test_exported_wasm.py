@@ -66,6 +66,9 @@ def test_javascript_class_gives_the_same_bits(case, exported: Path) -> None:
 CHECK = """
 import {{ readFileSync }} from "node:fs";
 import {{ Model, parameters }} from "./{name}.mjs";
+
+pytestmark = pytest.mark.xdist_group("exported_wasm")  # each module is built once
+
 const model = await Model.create(readFileSync("./{name}.wasm"));
 const at = () => model.get("info.state/pressure");
 model.reset(3);

@@ -237,6 +237,31 @@ def test_cached_code_depends_on_values_and_not_on_docstrings(tmp_path: Path) -> 
     assert len(list(cache.iterdir())) == 4
 
 
+_READ_ONLY = """
+import tempfile
+from pam_envs.kernels import compiler
+def refuse(*_, **__):
+    raise PermissionError("read-only")
+tempfile.TemporaryFile = compiler.write_whole = refuse
+import {name}
+print(sum({name}.made.stats.cache_hits.values()))
+"""
+
+
+@cached
+def test_cached_code_is_used_where_nothing_can_be_written(tmp_path: Path) -> None:
+    cache, name = tmp_path / "cache", "read_only"
+    source = _KEPT.format(offset=4.0, docstring="Add.")
+    called = "made = build(outer, 'kept'); print(made(1.0))"
+    text = source.replace('print(build(outer, "kept")(1.0))', called)
+    (tmp_path / f"{name}.py").write_text(text)
+    code = _READ_ONLY.format(name=name)
+    paths = (ROOT, tmp_path)
+    assert run(cache, "-c", code, paths=paths) == ["10.0", "0"]  # compiled, not kept
+    assert run(cache, "-c", f"import {name}", paths=paths) == ["10.0"]
+    assert run(cache, "-c", code, paths=paths) == ["10.0", "1"]  # from the disk
+
+
 @cached
 def test_cached_code_survives_a_move_of_its_module(tmp_path: Path) -> None:
     cache = tmp_path / "cache"

@@ -60,7 +60,7 @@ def test_another_seed_gives_another_policy(tmp_path, ppo):
 
 def test_a_killed_process_resumes_from_the_command_line(tmp_path):
     config = tmp_path / "tiny.yaml"
-    config.write_text(yaml.safe_dump({**tiny().as_dict(), "steps": 20_000}))
+    config.write_text(yaml.safe_dump({**tiny().as_dict(), "steps": 10_000}))
     base = ["train", ID, "--seed", "5", "--config", str(config), "--out"]
     assert main([*base, str(tmp_path / "whole")]) == 0
     folder = tmp_path / "killed"
@@ -75,7 +75,7 @@ def test_a_killed_process_resumes_from_the_command_line(tmp_path):
     process.wait()
     (folder / "checkpoint.pt.1.tmp").write_bytes(b"half")
     saved = checkpoint.load(folder / CHECKPOINT)["snapshot"]["counters"]["num_timesteps"]
-    assert 0 < saved < 20_000
+    assert 0 < saved < 10_000
     assert not (folder / "policy.onnx").exists()
     assert main(["train", ID, "--resume", "--out", str(folder)]) == 0
     assert not list(folder.glob("*.tmp"))

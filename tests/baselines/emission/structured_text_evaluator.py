@@ -6,6 +6,7 @@ call; anything else is an error.
 
 import operator
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from blark import parse, transform
@@ -29,14 +30,21 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 
 
+@cache
+def _parsed(text: str) -> Any:
+    """Return the only function block of a text."""
+    parsed = parse.parse_source_code(text)
+    if parsed.exception is not None:
+        raise ValueError(str(parsed.exception))
+    (block,) = parsed.transform().items
+    return block
+
+
 class FunctionBlock:
     """An instance of the only function block of a text."""
 
     def __init__(self, text: str) -> None:
-        parsed = parse.parse_source_code(text)
-        if parsed.exception is not None:
-            raise ValueError(str(parsed.exception))
-        (self.block,) = parsed.transform().items
+        self.block = _parsed(text)
         self.values: dict[str, Any] = {}
         self.types: dict[str, str] = {}
         for section in self.block.declarations:

@@ -16,6 +16,7 @@ from baselines.emission.structured_text import function_block, number
 pytest.importorskip("blark")
 from structured_text_evaluator import FunctionBlock
 
+pytestmark = pytest.mark.xdist_group("structured_text")  # a text is parsed once
 MUSCLE = "PAM/MusclePositioning-v0"
 INPUTS = {
     "Contraction": "contraction",

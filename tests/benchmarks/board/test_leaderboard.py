@@ -114,9 +114,10 @@ def test_declared_headline_is_beside_the_error(monkeypatch: pytest.MonkeyPatch) 
     assert classical[2].startswith("air [mg/s] 30.0")
 
 
-def test_excerpt_of_readme_is_that_of_the_rows():
+@pytest.mark.xdist_group("committed rows")
+def test_excerpt_of_readme_is_that_of_the_rows(committed):
     text = leaderboard.README.read_text(encoding="utf-8")
-    made = leaderboard.with_excerpt(text, leaderboard.load(rows.RESULTS), bounding.read())
+    made = leaderboard.with_excerpt(text, committed, bounding.read())
     assert made == text
     assert text.count("| `KneeWalk` | N |") == 1
 

@@ -12,7 +12,7 @@ from filelock import FileLock, Timeout
 
 from baselines.core import tuned
 from benchmarks.__main__ import main
-from benchmarks.identity import audit, tasks
+from benchmarks.identity import audit, hashing, tasks
 from benchmarks.runs import controllers, rows
 from benchmarks.runs.controllers import find
 from benchmarks.runs.store import comparable, read_record
@@ -154,6 +154,26 @@ def test_changed_controller_is_self_reported_until_the_next_round(board):
     assert not audit.in_last_round(old)  # the same artefact on other episodes
     assert audit.in_last_round(rows.load(run_row(board, "low")))
     assert draw(board, "low").number == 3  # a controller that is gone is a change, too
+
+
+def test_replaced_round_keeps_digests_and_the_last_one_is_whole(board):
+    first = draw(board, "trained", "low")
+    bench_fakes.write_policies(board / "policies", 0.02, 0.06)
+    second = draw(board, "trained", "low")
+    reduced, kept = audit.rounds()
+    assert kept == second
+    assert dataclasses.replace(reduced, task=first.task, entrants=first.entrants) == first
+    assert reduced.task == {"digest": first.task["digest"]}
+    assert reduced.entrants == {n: {"digest": e["digest"]} for n, e in first.entrants.items()}
+    assert len(audit.FILE.read_text().splitlines()) == 2 + 2  # a line for each
+
+
+def test_last_rounds_are_of_what_they_froze():
+    last = {entry.track: entry for entry in audit.rounds()}.values()
+    for entry in last:
+        frozen = {"task": entry.task["digest"], "entrants": entry.entrants}
+        assert entry.frozen == hashing.digest(frozen), entry.track
+    assert audit.text_of(audit.rounds()) == audit.FILE.read_text(encoding="utf-8")
 
 
 def test_changed_metric_needs_a_round(board, monkeypatch):

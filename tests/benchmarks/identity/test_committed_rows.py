@@ -6,6 +6,8 @@ from benchmarks.identity import audit
 from benchmarks.runs import rows, verified
 from benchmarks.runs.verify import void
 
+pytestmark = pytest.mark.xdist_group("committed rows")  # rows are read once
+
 CHEAP = {
     "positioning_disturbed": ("inverse_pid", "pid_tuned", "table"),
     "knee_walk_nominal": ("knee_inverse", "knee_hold", "knee_ltr"),
@@ -14,11 +16,6 @@ CHEAP = {
     "manipulator_payload": ("joint_inverse_kinematics", "joint_pi"),
 }
 """A track of every family of plants, and controllers that are quickly designed."""
-
-
-@pytest.fixture(scope="module")
-def committed():
-    return rows.load_all()
 
 
 def test_every_row_is_in_its_round(committed):

@@ -2,9 +2,12 @@
 
 import hashlib
 import json
+from collections import Counter
 
 import pytest
 
+from benchmarks.board import summary
+from benchmarks.scenarios import kinds
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet, available, public_seeds
 from tests.benchmarks.conftest import CONTENT
@@ -39,6 +42,24 @@ def test_scenario_has_the_same_seeds_in_all_tracks_of_an_environment():
     shared = set(nominal) & set(drawn)
     assert len(shared) > 3
     assert all(nominal[name] == drawn[name][: len(nominal[name])] for name in shared)
+
+
+def test_every_environment_has_one_track_of_each_kind_of_the_summary():
+    found = {}
+    for name, track in available().items():
+        for kind in summary.KINDS:
+            found.setdefault(track.env, Counter())[kind] += kinds.is_of(name, kind)
+    assert len(found) == 9
+    assert {tuple(counts.values()) for counts in found.values()} == {(1,) * len(summary.KINDS)}
+
+
+def test_counterpart_is_the_track_of_another_kind_with_the_same_environment():
+    tracks = available()
+    for name, track in tracks.items():
+        other = kinds.counterpart(name, kinds.NOMINAL, kinds.DRAWN)
+        assert (other is not None) == kinds.is_of(name, kinds.NOMINAL)
+        assert other is None or tracks[other].env == track.env
+    assert kinds.counterpart("nominal", kinds.NOMINAL, kinds.DRAWN) is None
 
 
 @pytest.mark.parametrize("seeds", [0, 1001, [101, 102], 2.0, True, "5"])

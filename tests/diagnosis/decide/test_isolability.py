@@ -25,6 +25,8 @@ from tests.diagnosis import hidden
 from tests.diagnosis.causes import users_cause
 from tests.diagnosis.conftest import base_of, needs_kernels
 
+pytestmark = pytest.mark.xdist_group("isolability")  # one study
+
 
 def study_of(**changes: object) -> Study:
     """Return the base, refitted to a clean rig."""

@@ -34,6 +34,7 @@ class FamilyRig:
     inputs: Callable[[Array, Array], tuple[dict[str, Array], dict[str, Any]]]
     outputs: tuple[str, ...]
     start: Any = None  # plant to diagnose, unless it is the family's default
+    share: float = 1.0  # of the campaign in a recording
 
     @property
     def noise(self) -> dict[str, float]:
@@ -57,7 +58,7 @@ class FamilyRig:
 
     def recorded(self, seed: int = 4, **hidden: float) -> Recording:
         """Return a recording of a rig with hidden effects."""
-        setpoints, labels = campaign()
+        setpoints, labels = campaign(share=self.share)
         inputs, driving = self.inputs(setpoints["set_point_a"], setpoints["set_point_b"])
         found = replay_plant(self.truth(**hidden), driving, period=PERIOD, substeps=8)
         random = np.random.default_rng(seed)
@@ -120,4 +121,5 @@ ARM = FamilyRig(
     _arm,
     ("angle_0", "angle_1", *(f"pressure_{m}" for m in range(4))),
     start=dataclasses.replace(_PLANAR),
+    share=0.7,
 )

@@ -15,6 +15,7 @@ from pam_envs.diagnosis.families.antagonistic_joint import JointKind
 from tests.diagnosis.conftest import needs_kernels
 from tests.diagnosis.families.joint_rig import (
     PERIOD,
+    SHARE,
     SHEET,
     campaign,
     joint,
@@ -63,7 +64,7 @@ def test_hidden_effect_is_named_and_explains_the_error(name):
 
 @needs_kernels
 def test_joint_without_a_hidden_effect_is_adequate_and_its_plant_goes_into_an_environment(tmp_path):
-    inputs, labels = campaign()
+    inputs, labels = campaign(share=SHARE)
     truth = joint()
     signals = inputs | readings(truth, inputs)
     (tmp_path / "rig.yaml").write_text(

@@ -15,7 +15,7 @@ from tests.diagnosis.conftest import needs_kernels, recorded
 from tests.diagnosis.report import report_fakes as fakes
 from tests.diagnosis.report.page_reader import Page
 
-pytestmark = needs_kernels
+pytestmark = [needs_kernels, pytest.mark.xdist_group("reports")]  # each diagnosis is made once
 CAUSES = ("leak", "temperature", "creep", "slip_step", "sensor_bias", "dead_time")
 
 

@@ -15,6 +15,8 @@ from pam_envs.diagnosis.static.models import TERMS, predict, units
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from tests.diagnosis.static.synthetic_readings import PRESSURES, table
 
+pytestmark = pytest.mark.xdist_group("static diagnosis")  # one report of the measured tables
+
 TABLE = load_contraction_table()
 COMPLIANCE = "load_dependent_compliance"
 WIDTH = "load_dependent_hysteresis"
