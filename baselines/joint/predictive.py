@@ -209,6 +209,8 @@ class JointPredictive(RowController):
         angle, rate, was, sliders = state.angle, state.rate, state.pressure, _flat(state.sliders)
         mass, unit = self._masses(view.payload), np.eye(angle.shape[1])
         for stage, time in zip(stages, times, strict=True):
+            if not time.any():
+                continue
             h = (time * self.bank.period)[:, None]
             ahead, middle = angle + 0.5 * h * rate, 0.5 * (was + stage)
             found, slid = self.model.pull(ahead.ravel(), middle.reshape(-1, 2), sliders)
@@ -221,7 +223,7 @@ class JointPredictive(RowController):
             moving = np.repeat(time > 0.0, angle.shape[1])[:, None, None]
             sliders, was = np.where(moving, slid, sliders), stage
         shaped = sliders.reshape(state.sliders.shape)
-        return state._replace(angle=angle, rate=rate, pressure=was, sliders=shaped)
+        return state._replace(angle=angle, rate=rate, pressure=stages[-1], sliders=shaped)
 
     def _masses(self, payload: Array) -> Array:
         """Return the mass matrices [kg m2] of the rows, shape (n_env, n_joints, n_joints)."""

@@ -251,7 +251,7 @@ class KneeAnticipation(RowController):
         A tension interpolated between stance and swing belongs to neither.
         """
         present = self.phase.present(plan)[:, None]
-        times = present + ends
+        times = self.phase.memory.within(plan.seen, present + ends)
         around = np.concatenate([np.floor(times), np.ceil(times)], axis=1)
         samples, _ = self._ahead(plan, around - present)
         before, after = np.hsplit(self._in_stance(samples[:, 0], samples[:, 1], now), 2)

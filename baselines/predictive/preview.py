@@ -72,6 +72,17 @@ class PreviewMemory:
         kept[rows, channels, at[:, None]] = samples[:, :, 1:]
         return Preview(kept, step)
 
+    def within(self, seen: Preview, times: Array) -> Array:
+        """Return times, (n_env, n_times), less the strides by which they are beyond the samples.
+
+        Times that are unknown, before the first sample or without a period, stay.
+        """
+        last = (seen.step + self.ahead[-1])[:, None]
+        if not math.isfinite(self.stride):
+            return times
+        back = times - np.ceil(np.maximum((times - last) / self.stride, 0.0)) * self.stride
+        return np.where(back >= 0.0, back, times)
+
     def read(self, seen: Preview, times: Array) -> tuple[Array, Rows]:
         """Return samples at times, (n_env, n_times), and where it is known.
 
