@@ -169,13 +169,9 @@ class Gravity:
         """Return the shift [rad] at angles (n_env, n_joints) with payloads [kg], (n_env,)."""
         if self.plant is None:
             return np.zeros_like(angles)
-        return self.shift_of(angles, self.torque(angles, payload))
-
-    def shift_of(self, angles: Array, torque: Array) -> Array:
-        """Return the shift [rad] with which the muscles exert torques [N m] at angles, (...)."""
         low, high = self.plant.angle_range
         along = (np.clip(angles, low, high) - low) / (high - low) * (ANGLES - 1)
-        torque = np.clip(torque, -LARGEST_TORQUE, LARGEST_TORQUE)
+        torque = np.clip(self.torque(angles, payload), -LARGEST_TORQUE, LARGEST_TORQUE)
         across = (torque / LARGEST_TORQUE + 1.0) * 0.5 * (TORQUES - 1)
         return np.asarray(map_coordinates(self._table, (along, across), order=1, mode="nearest"))
 

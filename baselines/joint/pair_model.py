@@ -15,12 +15,15 @@ from baselines.predictive.regulator import regulated
 from pam_envs.arrays import Array
 from pam_envs.hysteresis.slip import SlipModel, slip_lag, slip_to
 from pam_envs.kernels.build import entry, kernel
+from pam_envs.mechanics.antagonistic_lever import SIDES
 from pam_envs.plants.antagonistic_joint.statics import PairPlant
 
 POINTS = 1201
 """Angles, and setpoints, of the tables."""
 BEYOND = 0.1
 """Angle [rad] beyond the stop that the table covers."""
+RESOLUTION = 1.0
+"""Difference of pressures [Pa] that is not distinguished."""
 STRAIN, LEVER, AREA, PASSIVE, STIFFNESS = 0, 2, 4, 6, 8
 """Columns of the table, those of both muscles side by side: contraction beyond that of the straight
 joint [1], ``dL/dphi`` [m], force over pressure [m2], passive force [N]; stiffness [N m/rad]."""
@@ -46,24 +49,27 @@ def looked_up(table: Any, cell: int, share: float, column: int) -> float:
 
 
 @kernel
-def rub(
-    table: Any, numbers: Any, slip: Any, cell: int, share: float, pressures: Any, sliders: Any
-) -> tuple[float, float]:
-    """Return the torque [N m] of the friction, and the stiffness [N m/rad] of the part that sticks.
+def friction_of(
+    table: Any, numbers: Any, slip: Any, cell: int, share: float, side: int, pressure: float,
+    sliders: Any,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the friction [N] of a muscle and the slope [N] of the part that sticks.
 
-    The sliders of both muscles, shape (2, elements), move to the angle.
+    The sliders, shape (elements,), move to the angle.
     """
     thresholds, curves, low, per = slip
-    torque, stiffness = 0.0, 0.0
-    for side in range(2):
-        limit = numbers[LIMIT] + numbers[LIMIT_RATE] * pressures[side]
-        x = looked_up(table, cell, share, STRAIN + side)
-        lever = looked_up(table, cell, share, LEVER + side)
-        lag, stuck = slip_lag(x, limit, thresholds, curves, low, per, sliders[side])
-        slip_to(x, limit, thresholds, sliders[side], sliders[side])
-        torque = torque + numbers[DRAG] * lag * lever
-        stiffness = stiffness + numbers[DRAG] * stuck * lever * lever / numbers[LENGTH]
-    return torque, stiffness
+    limit = numbers[LIMIT] + numbers[LIMIT_RATE] * pressure
+    x = looked_up(table, cell, share, STRAIN + side)
+    lag, stuck = slip_lag(x, limit, thresholds, curves, low, per, sliders)
+    slip_to(x, limit, thresholds, sliders, sliders)
+    return numbers[DRAG] * lag, numbers[DRAG] * stuck
+
+
+@kernel
+def force_of(table: Any, cell: int, share: float, side: int, pressure: float) -> float:
+    """Return the force [N] of the law, below 0 where the muscle is slack."""
+    force = pressure * looked_up(table, cell, share, AREA + side)
+    return force - looked_up(table, cell, share, PASSIVE + side)
 
 
 @entry
@@ -78,20 +84,19 @@ def pull_rows(
     slip = (thresholds, curves, low, per)
     for r in range(len(angle)):
         cell, share = cell_at(table, numbers, angle[r])
-        torque, stiffness = rub(table, numbers, slip, cell, share, pressures[r], sliders[r])
-        damping = numbers[DAMPING]
+        torque, damping = 0.0, numbers[DAMPING]
+        stiffness = looked_up(table, cell, share, STIFFNESS)
         for side in range(2):
-            lever = looked_up(table, cell, share, LEVER + side)
-            force = pressures[r, side] * looked_up(table, cell, share, AREA + side)
-            force = max(0.0, force - looked_up(table, cell, share, PASSIVE + side))
-            torque = torque - force * lever
-            damping = damping + numbers[VISCOSITY] * pressures[r, side] * lever * lever
-        found[0, r], found[2, r] = torque, damping
-        found[1, r] = stiffness + looked_up(table, cell, share, STIFFNESS)
+            p, lever = pressures[r, side], looked_up(table, cell, share, LEVER + side)
+            drag, stuck = friction_of(table, numbers, slip, cell, share, side, p, sliders[r, side])
+            torque = torque - max(0.0, force_of(table, cell, share, side, p) - drag) * lever
+            stiffness = stiffness + stuck * lever * lever / numbers[LENGTH]
+            damping = damping + numbers[VISCOSITY] * p * lever * lever
+        found[0, r], found[1, r], found[2, r] = torque, stiffness, damping
 
 
 @entry
-def rub_rows(
+def friction_rows(
     table: Array, numbers: Array, thresholds: Array, curves: Array, low: float, per: float,
     angles: Array, pressures: Array, sliders: Array, torques: Array,
 ) -> None:  # fmt: skip
@@ -100,8 +105,53 @@ def rub_rows(
     for r in range(len(angles)):
         for k in range(angles.shape[1]):
             cell, share = cell_at(table, numbers, angles[r, k])
-            torque, _ = rub(table, numbers, slip, cell, share, pressures[r], sliders[r])
+            torque = 0.0
+            for side in range(2):
+                drag, _ = friction_of(
+                    table, numbers, slip, cell, share, side, pressures[r, side], sliders[r, side]
+                )
+                torque = torque + drag * looked_up(table, cell, share, LEVER + side)
             torques[r, k] = torque
+
+
+@kernel
+def share_of(value: float, least: float, most: float) -> float:
+    """Return the place of a value between two others, 0 below the first and 1 above the second."""
+    if value <= least:
+        return 0.0
+    return (value - least) / (most - least) if value < most else 1.0
+
+
+@kernel
+def torque_under(table: Any, cell: int, share: float, both: Any, k: int) -> float:
+    """Return the torque [N m] without friction under setpoint ``k``."""
+    torque = 0.0
+    for side in range(2):
+        force = max(0.0, force_of(table, cell, share, side, both[side, k]))
+        torque = torque - force * looked_up(table, cell, share, LEVER + side)
+    return torque
+
+
+@entry
+def set_point_rows(
+    table: Array, numbers: Array, set_points: Array, both: Array, angle: Array, torque: Array,
+    found: Array,
+) -> None:  # fmt: skip
+    """Write the setpoints [rad] under which the muscles exert torques [N m] at angles [rad]."""
+    for r in range(len(angle)):
+        cell, share = cell_at(table, numbers, angle[r])
+        low, high = 0, len(set_points) - 1
+        least = torque_under(table, cell, share, both, low)
+        most = torque_under(table, cell, share, both, high)
+        while high - low > 1:
+            middle = (low + high) // 2
+            there = torque_under(table, cell, share, both, middle)
+            if there < torque[r]:
+                low, least = middle, there
+            else:
+                high, most = middle, there
+        part = share_of(torque[r], least, most)
+        found[r] = set_points[low] + part * (set_points[high] - set_points[low])
 
 
 @kernel
@@ -128,12 +178,11 @@ def command_rows(
         while high - low > 1:
             middle = (low + high) // 2
             there = difference_after(both, middle, later[r], lag[r], rate[r], time)
-            if there < wanted[r]:
+            if there < wanted[r] - RESOLUTION:
                 low, least = middle, there
             else:
                 high, most = middle, there
-        share = (wanted[r] - least) / (most - least) if most > least else 0.5
-        share = max(0.0, min(1.0, share))
+        share = share_of(wanted[r], least, most)
         found[r] = angles[low] + share * (angles[high] - angles[low])
 
 
@@ -147,14 +196,16 @@ class Pull(NamedTuple):
 
 @dataclass(frozen=True)
 class PairModel:
-    """Nominal muscles of a joint, whose friction is driven by length."""
+    """Nominal muscles of a joint, without friction or with friction driven by length."""
 
     plant: PairPlant
 
     @staticmethod
     def fits(plant: Any) -> bool:
-        """Return whether a plant has muscles, with friction driven by length."""
-        return plant.dynamics == "muscles" and isinstance(plant.hysteresis.model, SlipModel)
+        """Return whether a plant has muscles, with friction driven by length or without any."""
+        law = plant.hysteresis
+        known = law.operator is None or isinstance(law.model, SlipModel)
+        return plant.dynamics == "muscles" and known
 
     # --- setpoints ------------------------------------------------------------------------------
 
@@ -194,19 +245,30 @@ class PairModel:
         edge, length = plant.largest_angle + BEYOND, muscle.rest_length
         angles = np.linspace(-edge, edge, POINTS)
         x = plant.lever.contraction(angles, length)
+        gains = muscle.gain * (1.0 + np.array(SIDES) * muscle.imbalance)
         strain = x - plant.lever.contraction(0.0, length)
         stiffness = plant.stiffness_at(np.clip(angles, *plant.angle_range))[:, None]
-        rest = plant.lever.rate(angles), muscle.area_at(x), muscle.passive(x), stiffness
+        forces = gains * muscle.area_at(x), gains * muscle.passive(x)
         per_pascal = float(law.slip(1e5) - law.slip(0.0)) / 1e5
         friction = float(law.stiffness(0.0)), float(law.slip(0.0)), per_pascal
         viscous, cells = muscle.viscosity / length, (POINTS - 1) / (2.0 * edge)
         numbers = np.array([*friction, viscous, plant.link.damping, length, -edge, cells])
-        table = np.ascontiguousarray(np.hstack([strain, *rest]))
-        return table, numbers, *law.model.arrays  # type: ignore[attr-defined]
+        table = np.ascontiguousarray(
+            np.hstack([strain, plant.lever.rate(angles), *forces, stiffness])
+        )
+        return np.ascontiguousarray(table), numbers, *self._slip
+
+    @cached_property
+    def _slip(self) -> tuple[Array, Array, float, float]:
+        """Return thresholds, curves and grid of the friction elements, none without friction."""
+        model = self.plant.hysteresis.model
+        if isinstance(model, SlipModel):
+            return model.arrays
+        return np.zeros(0), np.zeros((0, 2)), 0.0, 1.0
 
     def initial(self, angle: Array, pressures: Array) -> Array:
         """Return the sliders at angles [rad] after a virgin straight joint, (rows, 2, elements)."""
-        sliders = np.zeros((len(angle), 2, self.plant.hysteresis.model.elements))  # type: ignore[attr-defined]
+        sliders = np.zeros((len(angle), 2, len(self._slip[0])))
         return self.friction(angle[:, None], pressures, sliders)[1]
 
     def pull(self, angle: Array, pressures: Array, sliders: Array) -> tuple[Pull, Array]:
@@ -220,8 +282,18 @@ class PairModel:
         """Return the torques of friction [N m] at angles in turn, (rows, n), and the sliders."""
         given, after = np.ascontiguousarray(angles), sliders.copy()
         torques = np.empty_like(given)
-        rub_rows(*self._tables, given, np.ascontiguousarray(pressures), after, torques)
+        friction_rows(*self._tables, given, np.ascontiguousarray(pressures), after, torques)
         return torques, after
+
+    def set_point(self, angle: Array, torque: Array) -> Array:
+        """Return the setpoints [rad] under which the muscles exert torques [N m], any shape.
+
+        Without friction, at angles [rad]; out of reach the end of the range.
+        """
+        found = np.empty(angle.size)
+        given = (np.ascontiguousarray(angle).ravel(), np.ascontiguousarray(torque).ravel())
+        set_point_rows(*self._tables[:2], *self._set_points, *given, found)
+        return found.reshape(angle.shape)
 
     # --- nominal point --------------------------------------------------------------------------
 
@@ -249,34 +321,31 @@ class LinearMotion:
     ----------
     a, b : ndarray, shapes (2 n, 2 n) and (2 n, n)
         From angles [rad], rates [rad/s] and a torque [N m] that is held, to the next ones.
-    stiffness : float
-        ``K`` [N m/rad], the same for all joints.
     """
 
     a: Array
     b: Array
-    stiffness: float
 
     @classmethod
-    def make(cls, mass: Array, damping: Array, stiffness: float, period: float) -> "LinearMotion":
-        """Return the motion for a mass matrix [kg m2] and dampings [N m s/rad], (n,)."""
+    def make(cls, mass: Array, damping: Array, stiffness: Array, period: float) -> "LinearMotion":
+        """Return the motion for ``M`` [kg m2], ``D`` [N m s/rad], (n,), and ``K`` [N m/rad]."""
         n, inverse = len(mass), np.linalg.inv(mass)
         whole = np.zeros((3 * n, 3 * n))
         whole[:n, n : 2 * n] = np.eye(n)
-        whole[n : 2 * n] = np.hstack([-stiffness * inverse, -inverse * damping, inverse])
+        whole[n : 2 * n] = np.hstack([-inverse @ stiffness, -inverse * damping, inverse])
         moved = expm(whole * period)
-        return cls(moved[: 2 * n, : 2 * n], moved[: 2 * n, 2 * n :], stiffness)
+        return cls(moved[: 2 * n, : 2 * n], moved[: 2 * n, 2 * n :])
 
-    def observer(self, noise: float, rate_noise: float, torque_noise: float) -> Array:
+    def observer(self, noise: float, rate_step: float, torque_step: float) -> Array:
         """Return the steady Kalman gains of angles, rates and disturbance torques, (3 n, n).
 
-        Noise of the sensed angles [rad], and steps of rates [rad/s] and of the disturbance [N m] in
-        a period (pannocchia2003: a disturbance model without offset).
+        Noise of the sensed angles [rad], and random steps of rates [rad/s] and of the disturbance
+        [N m] in a period: the disturbance model of pannocchia2003, which leaves no static error.
         """
         n = self.b.shape[1]
         a = np.block([[self.a, self.b], [np.zeros((n, 2 * n)), np.eye(n)]])
         c = np.hstack([np.eye(n), np.zeros((n, 2 * n))])
-        steps = np.repeat([SMALL * noise, rate_noise, torque_noise], n)
+        steps = np.repeat([ANGLE_STEP * noise, rate_step, torque_step], n)
         sensed = noise**2 * np.eye(n)
         cover = solve_discrete_are(a.T, c.T, np.diag(steps**2), sensed)
         return np.asarray(cover @ c.T @ np.linalg.inv(c @ cover @ c.T + sensed))
@@ -284,14 +353,14 @@ class LinearMotion:
     def regulator(self, weight: float) -> Array:
         """Return the gains [N m/rad, N m s/rad] of a linear-quadratic regulator, shape (n, 2 n).
 
-        A torque costs as much as the deviation that the stiffness holds with it, over ``weight``.
+        ``weight`` [N m/rad] is that of an error of angle over that of a torque.
         """
         n = self.b.shape[1]
-        held = np.repeat([(weight * self.stiffness) ** 2, 0.0], n)
-        cost = solve_discrete_are(self.a, self.b, np.diag(held), np.eye(n))
+        errors = np.diag(np.repeat([weight**2, 0.0], n))
+        cost = solve_discrete_are(self.a, self.b, errors, np.eye(n))
         left = np.eye(n) + self.b.T @ cost @ self.b
         return np.asarray(np.linalg.solve(left, self.b.T @ cost @ self.a))
 
 
-SMALL = 1e-3
-"""Step of an angle in a period over the sensor's noise: the rate's is the cause of motion."""
+ANGLE_STEP = 1e-3
+"""Random step of an angle in a period over the sensor's noise: angles move by their rates."""

@@ -7,26 +7,27 @@ This is model predictive control of the nominal joint or arm, solved by its stru
 single muscle (:mod:`baselines.positioning.predictive`). Friction is driven by the length of the
 muscles, that is, by the angle: along a previewed reference it is known in advance,
 
-    torque = M(0) r'' + D r' + weight(r) - friction(r) - d + P e + Q e'
+    torque = M r'' + D r' + weight(r) - friction(r) - d + P e + Q e'
 
-with the disturbance ``d`` and the deviation ``e`` of the joint from the reference when a setpoint
-takes effect. ``M`` couples the joints of an arm. The muscles exert the torque at the angle ``r``
-under a setpoint of the static law; the difference of both pressures, which changes by at most twice
-the rate limit, follows the best path through those setpoints
-(:mod:`baselines.predictive.rate_limited`). Both muscles of a joint may then be at their rate limit,
-which a path of the angle would not use.
+with the torque ``friction`` of the friction on the joint, the disturbance ``d``, and the error ``e
+= r - q`` that is predicted for the time at which a setpoint takes effect. ``M`` is the mass matrix
+of the straight joints; it couples the joints of an arm. The muscles exert the torque at the angle
+``r`` under a setpoint of the static law. The difference of both pressures, which changes by at most
+twice the rate limit, follows the best path through those setpoints
+(:mod:`baselines.predictive.rate_limited`).
 
 The motion of the nominal joint under the estimated pressures is compared with the sensed angle. A
-Kalman filter corrects angle, rate and ``d`` (pannocchia2003): payload, weight, a wrong force law
-and a wrong friction are torques. ``P`` and ``Q`` are those of a linear-quadratic regulator of the
-linear motion (anderson2007); with the exact model they are at rest. The regulators are those of a
-bank (:mod:`baselines.predictive.regulator`), one for all muscles, chosen by the sensed pressures.
+Kalman filter corrects angle, rate and ``d`` (pannocchia2003): an undeclared payload, a wrong force
+law and a wrong friction are torques. ``P`` and ``Q`` are those of a linear-quadratic regulator of
+the linear motion (anderson2007). With an exact model and ideal sensors ``d`` and ``e`` are zero.
+The regulators of the pressures are those of a bank (:mod:`baselines.predictive.regulator`), one for
+all muscles, chosen by the sensed pressures.
 
-In an arm, joints whose setpoints are at the end of their range miss their reference; the others
-then make up for the error of the tool, by damped least squares (nakamura1986).
+In an arm, a joint whose setpoint is at the end of its range cannot reach its reference; the others
+compensate the error of the tool, by damped least squares (nakamura1986).
 
 A plant without muscles, or with friction driven by pressure, whose inverse is that of the setpoint,
-has the controller of :mod:`baselines.joint.disturbance_observer`, as designed.
+has the model-following controller (``joint_mfc_mu_ahead``) as designed.
 """
 
 import math
@@ -42,12 +43,13 @@ from baselines.core.controller import Prediction, Reader, RowController, by_load
 from baselines.core.entry import Bounds, Spec
 from baselines.joint.base import (
     JOINT_ENTRY,
+    LARGEST_TORQUE,
     Gravity,
     JointSignalMap,
     JointView,
     make_joint_signal_map,
 )
-from baselines.joint.disturbance_observer import JointObserver, make_joint_observer
+from baselines.joint.model_following import ModelFollowing, make_model_following
 from baselines.joint.pair_model import LinearMotion, PairModel
 from baselines.predictive.preview import Preview, PreviewMemory
 from baselines.predictive.rate_limited import best_path
@@ -61,21 +63,26 @@ ENDS = np.cumsum(BLOCKS)
 APART = 3.0
 """Distance [periods] of the samples whose differences are the reference's rate and acceleration."""
 LEAD = 0.5
-"""Share of the damping that is compensated by a lead of the reference, the rest by its rate."""
-RATE_NOISE, TORQUE_NOISE = 0.02, 0.01
+"""Share of the damping of muscles and link that is compensated by a lead of the reference; the rest
+is compensated by its rate."""
+LEAST_NOISE = 1e-4
+"""Smallest noise [rad] of the sensed angle for which the observer is designed."""
+RATE_STEP, TORQUE_STEP = 0.02, 0.01
 """Random steps in a period of the rate [rad/s] and of the disturbance [N m]."""
-FARTHEST, FASTEST = 0.05, 0.5
-"""Largest deviations of angle [rad] and rate [rad/s] that are fed back."""
-AT_END = 1e-4
+LARGEST_ERROR, LARGEST_RATE_ERROR = 0.05, 0.5
+"""Largest errors of angle [rad] and rate [rad/s] that are fed back."""
+END_TOLERANCE = 1e-4
 """Distance [rad] of a setpoint from the end of its range that counts as at the end."""
-LEAST, MOST = 0.002, 0.1
-"""Smallest missed angle [rad] that the other joints make up for, and largest change of theirs."""
+SMALLEST_SHORTFALL, LARGEST_SHIFT = 5e-4, 0.1
+"""Shortfall [rad] of a joint beyond which the others compensate it; largest compensation [rad]."""
 SETTLING = 10.0
-"""Time constant [periods] of the missed angles."""
+"""Time constant [periods] of the shortfalls."""
 TOOL = 0.1
 """Length [m] that makes errors of the tool's direction and position comparable."""
-MAKE_UP = 0.02
+COMPENSATION_DAMPING = 0.02
 """Damping of the least squares [m/rad]."""
+GRADIENT = 1e-4
+"""Angle [rad] for the stiffness of the weight."""
 KNOBS: Bounds = {"lead": (0.1, 4.0), "observer": (0.1, 10.0), "feedback": (0.1, 6.0)}
 """Factors on the lead, on the observer's noise of rate and disturbance, and on the regulator's
 weight of a deviation."""
@@ -94,7 +101,7 @@ class PredictiveState(NamedTuple):
         State of the friction.
     angle, rate, disturbance : ndarray, shape (n_env, n_joints)
         Estimates [rad], [rad/s], [N m].
-    missed : ndarray, shape (n_env, n_joints)
+    shortfall : ndarray, shape (n_env, n_joints)
         Angles [rad] by which joints at the end of their range miss the reference.
     """
 
@@ -105,7 +112,7 @@ class PredictiveState(NamedTuple):
     angle: Array
     rate: Array
     disturbance: Array
-    missed: Array
+    shortfall: Array
 
 
 class Demand(NamedTuple):
@@ -132,12 +139,13 @@ class JointPredictive(RowController):
         Reader of the sensed pressures, those of a joint side by side.
     mass : callable
         From a payload [kg] to the mass matrix [kg m2] of the straight joints.
+    gains : callable
+        From a payload [kg] to the gains of observer and regulator, shapes (3 n_joints, n_joints)
+        and (n_joints, 2 n_joints) (:class:`~baselines.joint.pair_model.LinearMotion`).
     damping : ndarray, shape (n_joints,)
         Damping [N m s/rad] beside that of the muscles and of their link.
     lead : float
         Lead of the reference [s].
-    observer, feedback : ndarray, shapes (3 n_joints, n_joints) and (n_joints, 2 n_joints)
-        Gains of :class:`~baselines.joint.pair_model.LinearMotion`.
     """
 
     model: PairModel
@@ -147,10 +155,9 @@ class JointPredictive(RowController):
     memory: PreviewMemory
     bank: RegulatorBank
     mass: Callable[[float], Array]
+    gains: Callable[[float], tuple[Array, Array]]
     damping: Array
     lead: float
-    observer: Array
-    feedback: Array
 
     def initial_state(self, observation: ArrayLike) -> PredictiveState:
         """Return the state at rest at the present angles and setpoints."""
@@ -172,9 +179,10 @@ class JointPredictive(RowController):
         """Return the action and the next state."""
         view = self.signals.read(observation)
         now = self.observed(observation, view, state)
-        set_point, missed = self._set_points(view, now)
+        set_point, shortfall = self._set_points(view, now)
         bank = self.bank.advance(now.bank, self.model.pressures(set_point).ravel())
-        return self.signals.write(set_point, observation), now._replace(bank=bank, missed=missed)
+        after = now._replace(bank=bank, shortfall=shortfall)
+        return self.signals.write(set_point, observation), after
 
     def observed(
         self, observation: ArrayLike, view: JointView, state: PredictiveState
@@ -185,7 +193,8 @@ class JointPredictive(RowController):
         pressure = self.bank.now(bank).reshape(state.pressure.shape)
         expected = self._moved(view, state, pressure[None], np.ones((1, len(sensed))))
         n = view.angle.shape[1]
-        more = _product(self.observer, view.angle - expected.angle)
+        gains, _ = self._gains(view.payload)
+        more = _product(gains, view.angle - expected.angle)
         angle = expected.angle + more[:, :n]
         flat = angle.reshape(-1, 1), pressure.reshape(-1, 2), _flat(state.sliders)
         sliders = self.model.friction(*flat)[1].reshape(state.sliders.shape)
@@ -195,7 +204,9 @@ class JointPredictive(RowController):
             sliders=sliders,
             angle=angle,
             rate=expected.rate + more[:, n : 2 * n],
-            disturbance=state.disturbance + more[:, 2 * n :],
+            disturbance=np.clip(
+                state.disturbance + more[:, 2 * n :], -LARGEST_TORQUE, LARGEST_TORQUE
+            ),
         )
 
     def _moved(
@@ -222,7 +233,8 @@ class JointPredictive(RowController):
             angle, rate = angle + h * (rate + 0.5 * gained), rate + gained
             moving = np.repeat(time > 0.0, angle.shape[1])[:, None, None]
             sliders, was = np.where(moving, slid, sliders), stage
-        shaped = sliders.reshape(state.sliders.shape)
+        flat = angle.reshape(-1, 1), stages[-1].reshape(-1, 2), sliders
+        shaped = self.model.friction(*flat)[1].reshape(state.sliders.shape)
         return state._replace(angle=angle, rate=rate, pressure=stages[-1], sliders=shaped)
 
     def _masses(self, payload: Array) -> Array:
@@ -233,8 +245,17 @@ class JointPredictive(RowController):
 
         return np.asarray(by_load(payload, repeated, payload))
 
+    def _gains(self, payload: Array) -> tuple[Array, Array]:
+        """Return the gains of observer and regulator of the rows."""
+
+        def repeated(load: float, rows: Array) -> tuple[Array, ...]:
+            return tuple(np.repeat(part[None], len(rows), axis=0) for part in self.gains(load))
+
+        observer, regulator = by_load(payload, repeated, payload)
+        return observer, regulator
+
     def _set_points(self, view: JointView, now: PredictiveState) -> tuple[Array, Array]:
-        """Return the setpoints [rad] and the missed angles [rad], shape (n_env, n_joints)."""
+        """Return the setpoints [rad] and the shortfalls [rad], shape (n_env, n_joints)."""
         shape, period = view.angle.shape, self.bank.period
         arrival = self.bank.arrival(now.bank)
         stages = arrival.pressures.reshape(-1, *shape, 2)
@@ -244,36 +265,48 @@ class JointPredictive(RowController):
         count, whole = np.arange(len(stages))[:, None], np.floor(delay[:, 0])
         first = np.where(count == 0, delay[:, 0] - whole, 1.0)
         then = self._moved(view, now, stages, np.where(count <= whole, first, 0.0))
-        demand = self._demand(now, then, delay[:, 0])
-        missed = self._missed(view, now)
-        more = self._made_up(view, missed)[..., None]
-        demand = demand._replace(angle=demand.angle + more, led=demand.led + more)
+        shortfall = self._shortfall(view, now)
+        shift = self._compensation(view, shortfall)
+        demand = self._demand(view, now, then, delay[:, 0], shift)
         later = then.pressure.reshape(-1, 2)
         wanted = self.model.difference(self._levels(view, then, demand)).reshape(len(later), -1)
         weight, reach = np.tile(BLOCKS, (len(later), 1)), 2.0 * period * rate.reshape(-1, 1)
         path = best_path(later[:, 0] - later[:, 1], wanted, weight, reach * BLOCKS)
         found = self.model.command(later, path[:, 0], lag.ravel(), rate.ravel(), period)
-        return found.reshape(shape), missed
+        return found.reshape(shape), shortfall
 
-    def _demand(self, now: PredictiveState, then: PredictiveState, delay: Array) -> Demand:
-        """Return the demand after a delay [periods], (n_env,), when the joints are at ``then``."""
+    def _demand(
+        self,
+        view: JointView,
+        now: PredictiveState,
+        then: PredictiveState,
+        delay: Array,
+        shift: Array,
+    ) -> Demand:
+        """Return the demand after a delay [periods], (n_env,), when the joints are at ``then``.
+
+        ``shift``, shape (n_env, n_joints), is added to the reference [rad].
+        """
         period = self.bank.period
         start = (now.seen.step + delay)[:, None]
         at = start + ENDS + self.lead / period
         around = start + np.array([-1.0, 0.0, 1.0])
         times = (start + ENDS, at - APART, at, at + APART, around)
-        samples, _ = self.memory.read(now.seen, np.concatenate(times, axis=1))
+        given = np.maximum(np.concatenate(times, axis=1), 0.0)
+        samples = self.memory.read(now.seen, given)[0] + shift[..., None]
         angle, before, led, after, near = np.split(samples, np.arange(1, 5) * len(ENDS), axis=2)
         ahead = APART * period
         off = near[..., 1] - then.angle
         slow = (near[..., 2] - near[..., 0]) / (2.0 * period) - then.rate
-        fed = np.clip(off, -FARTHEST, FARTHEST), np.clip(slow, -FASTEST, FASTEST)
+        off = np.clip(off, -LARGEST_ERROR, LARGEST_ERROR)
+        slow = np.clip(slow, -LARGEST_RATE_ERROR, LARGEST_RATE_ERROR)
+        _, gains = self._gains(view.payload)
         return Demand(
             angle,
             led,
             (after - before) / (2.0 * ahead),
             (before - 2.0 * led + after) / ahead**2,
-            _product(self.feedback, np.concatenate(fed, axis=1)),
+            _product(gains, np.concatenate([off, slow], axis=1)),
         )
 
     def _levels(self, view: JointView, then: PredictiveState, demand: Demand) -> Array:
@@ -291,29 +324,31 @@ class JointPredictive(RowController):
         pushed = self._masses(view.payload)[..., None] * demand.acceleration[:, None]
         torque = torque + np.add.reduce(pushed, axis=2)
         bend = 0.5 * self.lead**2 * demand.acceleration
-        return demand.led - bend + self.gravity.shift_of(demand.angle, torque)
+        static = self.model.set_point(demand.angle, torque) - demand.angle
+        return demand.led - bend + static
 
-    def _missed(self, view: JointView, now: PredictiveState) -> Array:
+    def _shortfall(self, view: JointView, now: PredictiveState) -> Array:
         """Return the filtered angles [rad] by which joints at the end of their range are short."""
         low, high = self.model.plant.angle_range
-        off = np.clip(now.angle - view.reference, -MOST, MOST)
-        ends = (view.set_point <= low + AT_END) | (view.set_point >= high - AT_END)
+        off = np.clip(now.angle - view.reference, -LARGEST_SHIFT, LARGEST_SHIFT)
+        ends = np.abs(view.set_point - np.where(view.set_point > 0.0, high, low)) <= END_TOLERANCE
         short = np.where(ends & (off * view.set_point < 0.0), off, 0.0)
-        return np.asarray(now.missed + (short - now.missed) / SETTLING)
+        return np.asarray(now.shortfall + (short - now.shortfall) / SETTLING)
 
-    def _made_up(self, view: JointView, missed: Array) -> Array:
-        """Return the change of the references [rad] with which the tool is where it should be."""
-        chain, short = getattr(self.model.plant, "chain", None), np.abs(missed) > LEAST
-        if chain is None or not short.any():
-            return np.zeros_like(missed)
+    def _compensation(self, view: JointView, shortfall: Array) -> Array:
+        """Return the shifts of the references [rad] that keep the tool where it should be."""
+        chain = getattr(self.model.plant, "chain", None)
+        size = np.maximum(np.abs(shortfall) - SMALLEST_SHORTFALL, 0.0)
+        if chain is None or not size.any():
+            return np.zeros_like(shortfall)
         scale = np.repeat([1.0, TOOL], 3)[:, None]
         jacobian = scale * chain.jacobian(view.reference)
-        own = np.where(short[:, None], 0.0, jacobian)
-        error = np.add.reduce(jacobian * np.where(short, missed, 0.0)[:, None], axis=2)
-        square = np.add.reduce(own[..., None] * own[:, :, None], axis=1)
-        left = square + MAKE_UP**2 * np.eye(missed.shape[1])
-        more = -_solved(left, np.add.reduce(own * error[..., None], axis=1))
-        return np.clip(more, -MOST, MOST)
+        free = np.where(size[:, None] > 0.0, 0.0, jacobian)
+        error = np.add.reduce(jacobian * (np.sign(shortfall) * size)[:, None], axis=2)
+        square = np.add.reduce(free[..., None] * free[:, :, None], axis=1)
+        left = square + COMPENSATION_DAMPING**2 * np.eye(shortfall.shape[1])
+        shift = -_solved(left, np.add.reduce(free * error[..., None], axis=1))
+        return np.clip(shift, -LARGEST_SHIFT, LARGEST_SHIFT)
 
 
 def _flat(sliders: Array) -> Array:
@@ -322,7 +357,10 @@ def _flat(sliders: Array) -> Array:
 
 
 def _product(matrix: Array, rows: Array) -> Array:
-    """Return ``matrix @ row`` for every row, in an order that depends on no other row."""
+    """Return ``matrix @ row`` for every row, in an order that depends on no other row.
+
+    ``matrix`` has the shape (n_env, m, n), ``rows`` (n_env, n).
+    """
     return np.asarray(np.add.reduce(matrix * rows[:, None], axis=2))
 
 
@@ -331,32 +369,40 @@ def _solved(left: Array, right: Array) -> Array:
     return np.asarray(np.linalg.solve(left, right[..., None])[..., 0])
 
 
-def make_joint_predictive(spec: Spec[Any]) -> JointPredictive | JointObserver:
+def make_joint_predictive(spec: Spec[Any]) -> JointPredictive | ModelFollowing:
     """Return the controller of a joint or an arm."""
     plant, period = spec.plant, spec.plant.control_period
     if not PairModel.fits(plant):
-        return make_joint_observer(replace(spec, knobs={}))
+        return make_model_following(replace(spec, knobs={}), gravity=True, ahead=True)
     signals, model = make_joint_signal_map(spec.signals, spec.actions), PairModel(plant)
     names = [""] if plant.stages == 1 else [str(k) for k in range(plant.stages)]
     muscles = [f"pressure_{name}{muscle}" for name in names for muscle in "ab"]
-    mass, damping = cache(_mass_of(plant)), np.zeros(plant.stages)
+    mass, gravity, damping = cache(_mass_of(plant)), Gravity(plant), np.zeros(plant.stages)
     if plant.stages > 1:
         damping = plant.arm.damping_factor * np.array(plant.joint_damping)
-    motion = LinearMotion.make(mass(0.0), model.damping + damping, model.stiffness, period)
-    noise, pace = math.hypot(plant.angle.noise, plant.angle.resolution / 12**0.5), "observer"
-    steps = (spec.knob(pace) * RATE_NOISE, spec.knob(pace) * TORQUE_NOISE)
+    noise = max(LEAST_NOISE, math.hypot(plant.angle.noise, plant.angle.resolution / 12**0.5))
+    steps = (spec.knob("observer") * RATE_STEP, spec.knob("observer") * TORQUE_STEP)
+
+    @cache
+    def gains(payload: float) -> tuple[Array, Array]:
+        turns, held = GRADIENT * np.eye(plant.stages), np.full(plant.stages, payload)
+        weight = gravity.torque(turns, held) - gravity.torque(-turns, held)
+        stiffness = model.stiffness * np.eye(plant.stages) + weight / (2.0 * GRADIENT)
+        motion = LinearMotion.make(mass(payload), model.damping + damping, stiffness, period)
+        regulator = motion.regulator(spec.knob("feedback") * model.stiffness)
+        return motion.observer(noise, *steps), regulator
+
     return JointPredictive(
         model,
         signals,
-        Gravity(plant),
+        gravity,
         reader(spec.signals, muscles),
         PreviewMemory.make(np.array([round(time / period) for time in signals.times])),
         RegulatorBank.make(plant, adaptive=True),
         mass,
+        gains,
         damping,
         spec.knob("lead") * LEAD * model.damping / model.stiffness,
-        motion.observer(noise, *steps),
-        motion.regulator(spec.knob("feedback")),
     )
 
 

@@ -64,12 +64,12 @@ class PreviewMemory:
     def add(self, seen: Preview, samples: Array) -> Preview:
         """Return the memory one period later, with its previewed samples.
 
-        The present sample is left out: it may differ from what was planned.
+        The present sample is left out if there are others: it may differ from what was planned.
         """
-        kept, step = seen.samples.copy(), seen.step + 1
-        at = (step[:, None] + self.ahead[1:]) % self.size
+        kept, step, first = seen.samples.copy(), seen.step + 1, min(1, len(self.ahead) - 1)
+        at = (step[:, None] + self.ahead[first:]) % self.size
         rows, channels = np.arange(len(kept))[:, None, None], np.arange(kept.shape[1])[:, None]
-        kept[rows, channels, at[:, None]] = samples[:, :, 1:]
+        kept[rows, channels, at[:, None]] = samples[:, :, first:]
         return Preview(kept, step)
 
     def within(self, seen: Preview, times: Array) -> Array:

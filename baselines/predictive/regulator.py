@@ -162,9 +162,9 @@ class RegulatorBank:
         return state._replace(deviation=kept + error)
 
     def alike(self, state: BankState, count: int) -> BankState:
-        """Return the state in which ``count`` rows in turn have the same regulator.
+        """Return the state with deviations averaged over groups of ``count`` consecutive rows.
 
-        Each has the mean of their deviations.
+        A group then has one regulator.
         """
         members = state.deviation.reshape(-1, count, state.deviation.shape[1])
         mean = np.add.reduce(members, axis=1) / count
