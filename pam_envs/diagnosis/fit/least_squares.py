@@ -416,16 +416,26 @@ def normal_equations(problem: Problem, fit: Fit) -> tuple[Array, Array]:
 
 
 def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> Array:
-    """Return the coordinates reached with each damping, shape (dampings, n)."""
+    """Return the coordinates reached with each damping, shape (dampings, n).
+
+    Where the leading parameters have a shared Jacobian, which holds only near the base's optimum, a
+    further step moves the others alone.
+    """
     normal, gradient = normal_equations(problem, fit)
     table = fit.table
     reach = np.where(table.log, REACH_LOG, REACH)
-    low, high = table.spans - fit.z
     scale = np.sqrt(np.diag(normal)) + 1e-6
     scaled, slope = normal / np.outer(scale, scale), gradient / scale
+    low, high = (table.spans - fit.z) * scale
+    every = slice(None)
+    moves = [(every, damping) for damping in dampings]
+    if fit.held:
+        moves.append((slice(fit.held, None), dampings[0]))
     tried = []
-    for relative in dampings:
-        step = bounded_step(scaled, slope, fit.damping * relative, low * scale, high * scale)
+    for part, relative in moves:
+        step = np.zeros(len(slope))
+        equations = scaled[part, part], slope[part], fit.damping * relative
+        step[part] = bounded_step(*equations, low[part], high[part])
         step /= scale
         tried.append(fit.z + step / max(1.0, float(np.max(np.abs(step) / reach))))
     return np.array(tried)

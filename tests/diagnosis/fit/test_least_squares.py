@@ -10,6 +10,7 @@ from scipy.optimize import lsq_linear
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.intervals import spans
 from pam_envs.diagnosis.fit.least_squares import (
+    FEW_DAMPINGS,
     WORST,
     Fit,
     Free,
@@ -134,6 +135,21 @@ def test_shared_jacobian_reaches_the_same_optimum():
     improve(problem, both, 30, 1e-9)
     assert both[0].values()["bias"] == pytest.approx(0.4, abs=0.01)
     assert both[0].cost == pytest.approx(both[1].cost, rel=1e-6)
+
+
+def test_cause_takes_its_size_where_the_shared_slopes_mislead_the_base():
+    problem = problem_of(drawn(8) + np.array([[0.02], [0.0]]))
+    base = fitted(problem, GAIN, LAG, SLOPE)
+    differentiate(problem, [base])
+    shared = share(problem, base)
+    start = np.append(base.z, BIAS.inner(1.0))
+    start[0] -= 0.5 / GAIN.scale
+    misled = replace(shared, slopes=-shared.slopes)
+    fit = Fit((GAIN, LAG, SLOPE, BIAS), start.copy(), base.column, shared=misled)
+    evaluate(problem, [fit])
+    improve(problem, [fit], 1, 1e-4, FEW_DAMPINGS)
+    assert (fit.z[:3] == start[:3]).all()
+    assert fit.values()["bias"] == pytest.approx(0.05, abs=0.01)  # with a part of the gain
 
 
 @pytest.mark.parametrize("seed", range(20))
