@@ -32,3 +32,13 @@ def test_unknown_times_stay():
     memory, seen = remembered(np.inf)
     times = np.array([[30.0, 90.0]])
     np.testing.assert_array_equal(memory.within(seen, times), times)
+
+
+def test_without_preview_the_present_sample_is_remembered():
+    memory = PreviewMemory.make(np.array([0]))
+    seen = memory.start(np.array([[[5.0]]]))
+    for value in (6.0, 7.0, 8.0):
+        seen = memory.add(seen, np.array([[[value]]]))
+    found, known = memory.read(seen, np.array([[2.0, 9.0]]))
+    np.testing.assert_array_equal(found[0, 0], [8.0, 8.0])
+    np.testing.assert_array_equal(known[0], [True, False])
