@@ -23,6 +23,7 @@ BASES = (
     "joint_inverse_ahead",
     "joint_inverse_dob",
     "joint_mfc_mu_ahead",
+    "joint_predictive",
 )
 """Controllers whose designs use most of the model, of every family of plants."""
 
