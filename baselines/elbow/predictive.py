@@ -61,7 +61,7 @@ class ElbowState(NamedTuple):
     Attributes
     ----------
     bank, friction
-        States of the regulators and of the bundles.
+        States of the regulators, grouped by environment, and of the bundles.
     motion : ndarray, shape (n_env, 3)
         Angle [rad], rate [rad/s] and acceleration [rad/s2].
     mean : ndarray, shape (n_env, 3)
@@ -104,7 +104,7 @@ class ElbowPredictive(RowController):
         view = self.signals.read(observation)
         still, given = np.zeros_like(view.angle), self._given(view)
         return ElbowState(
-            self.bank.start(view.pressure.T.ravel()),
+            self.bank.start(view.pressure.T.ravel()).grouped(2),
             self.friction.initial(len(view.angle)),
             np.stack([view.angle, still, still], axis=1),
             given,
@@ -129,12 +129,13 @@ class ElbowPredictive(RowController):
         pressures = np.array(pressures_for(plant, then.angle, *references, losses, limits))
         found = arrival.set_point(pressures.T.ravel(), period)
         command = np.clip(found, 0.0, plant.full_pressure)
-        after = now._replace(bank=self.bank.advance(now.bank, command))
+        after = now._replace(bank=self.bank.advance(now.bank, command).grouped(2))
         return self.signals.write(command.reshape(-1, 2).T, observation), after
 
     def observed(self, view: ElbowView, state: ElbowState) -> ElbowState:
         """Return the state with what an observation shows."""
-        bank = self.bank.alike(self.bank.observe(state.bank, view.pressure.T.ravel()), 2)
+        bank = self.bank.observe(state.bank.flat(), view.pressure.T.ravel())
+        bank = self.bank.alike(bank, 2)
         expected = np.add.reduce(state.motion[:, None] * self.step, axis=2)
         motion = expected + self.gains * (view.angle - expected[:, 0])[:, None]
         held = self.bank.now(bank).reshape(-1, 2).T

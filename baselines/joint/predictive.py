@@ -33,7 +33,7 @@ has the model-following controller (``joint_mfc_mu_ahead``) as designed.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -94,7 +94,7 @@ class PredictiveState(NamedTuple):
     Attributes
     ----------
     bank, seen
-        States of the regulators and of the preview.
+        States of the regulators, grouped by environment, and of the preview.
     pressure : ndarray, shape (n_env, n_joints, 2)
         Estimated pressures [Pa] of the muscles.
     sliders : ndarray, shape (n_env, n_joints, 2, elements)
@@ -130,6 +130,60 @@ class Demand(NamedTuple):
 
 
 @dataclass(frozen=True)
+class StraightMotion:
+    """Motion of the straight joints with a payload, and the gains that are designed for it.
+
+    ``observer`` and ``feedback`` are factors; see ``KNOBS``.
+    """
+
+    plant: Any
+    model: PairModel
+    observer: float
+    feedback: float
+
+    @cached_property
+    def damping(self) -> Array:
+        """Damping [N m s/rad] beside that of the muscles and of their link, (n_joints,)."""
+        plant = self.plant
+        if plant.stages == 1:
+            return np.zeros(1)
+        return np.asarray(plant.arm.damping_factor * np.array(plant.joint_damping))
+
+    @cached_property
+    def mass(self) -> Callable[[float], Array]:
+        """From a payload [kg] to the mass matrix [kg m2], cached."""
+        return cache(self._mass)
+
+    @cached_property
+    def gains(self) -> Callable[[float], tuple[Array, Array]]:
+        """From a payload [kg] to the gains of observer and regulator, cached.
+
+        Their shapes are (3 n_joints, n_joints) and (n_joints, 2 n_joints)
+        (:class:`~baselines.joint.pair_model.LinearMotion`).
+        """
+        return cache(self._gains)
+
+    def _mass(self, payload: float) -> Array:
+        if self.plant.stages > 1:
+            found = self.plant.chain.mass_matrix(np.zeros(self.plant.stages), payload)
+            return np.asarray(found)
+        link = self.plant.link
+        return np.array([[link.inertia + payload * link.length**2]])
+
+    def _gains(self, payload: float) -> tuple[Array, Array]:
+        plant, model, unit = self.plant, self.model, np.eye(self.plant.stages)
+        held, weight = np.full(len(unit), payload), Gravity(plant).torque
+        slope = weight(GRADIENT * unit, held) - weight(-GRADIENT * unit, held)
+        stiffness = model.stiffness * unit + slope / (2.0 * GRADIENT)
+        damping = model.damping + self.damping
+        motion = LinearMotion.make(self._mass(payload), damping, stiffness, plant.control_period)
+        noise = max(LEAST_NOISE, math.hypot(plant.angle.noise, plant.angle.resolution / 12**0.5))
+        steps = (self.observer * RATE_STEP, self.observer * TORQUE_STEP)
+        regulator = motion.regulator(self.feedback * model.stiffness)
+        return motion.observer(noise, *steps), regulator
+
+
+@dataclass(frozen=True)
 class JointPredictive(RowController):
     """Predictive inverse; see the module.
 
@@ -137,13 +191,6 @@ class JointPredictive(RowController):
     ----------
     pressures : Reader
         Reader of the sensed pressures, those of a joint side by side.
-    mass : callable
-        From a payload [kg] to the mass matrix [kg m2] of the straight joints.
-    gains : callable
-        From a payload [kg] to the gains of observer and regulator, shapes (3 n_joints, n_joints)
-        and (n_joints, 2 n_joints) (:class:`~baselines.joint.pair_model.LinearMotion`).
-    damping : ndarray, shape (n_joints,)
-        Damping [N m s/rad] beside that of the muscles and of their link.
     lead : float
         Lead of the reference [s].
     """
@@ -154,9 +201,7 @@ class JointPredictive(RowController):
     pressures: Reader
     memory: PreviewMemory
     bank: RegulatorBank
-    mass: Callable[[float], Array]
-    gains: Callable[[float], tuple[Array, Array]]
-    damping: Array
+    motion: StraightMotion
     lead: float
 
     def initial_state(self, observation: ArrayLike) -> PredictiveState:
@@ -165,7 +210,7 @@ class JointPredictive(RowController):
         held, still = self.model.pressures(view.set_point), np.zeros_like(view.angle)
         sliders = self.model.initial(view.angle.ravel(), held.reshape(-1, 2))
         return PredictiveState(
-            self.bank.start(held.ravel()),
+            self.bank.start(held.ravel()).grouped(held[0].size),
             self.memory.start(view.samples),
             held,
             sliders.reshape(*held.shape, -1),
@@ -181,6 +226,7 @@ class JointPredictive(RowController):
         now = self.observed(observation, view, state)
         set_point, shortfall = self._set_points(view, now)
         bank = self.bank.advance(now.bank, self.model.pressures(set_point).ravel())
+        bank = bank.grouped(now.pressure[0].size)
         after = now._replace(bank=bank, shortfall=shortfall)
         return self.signals.write(set_point, observation), after
 
@@ -189,7 +235,9 @@ class JointPredictive(RowController):
     ) -> PredictiveState:
         """Return the state with what an observation shows of reference and plant."""
         sensed = self.pressures.rows(observation).T
-        bank = self.bank.alike(self.bank.observe(state.bank, sensed.ravel()), sensed.shape[1])
+        bank = self.bank.alike(
+            self.bank.observe(state.bank.flat(), sensed.ravel()), sensed.shape[1]
+        )
         pressure = self.bank.now(bank).reshape(state.pressure.shape)
         expected = self._moved(view, state, pressure[None], np.ones((1, len(sensed))))
         n = view.angle.shape[1]
@@ -226,7 +274,7 @@ class JointPredictive(RowController):
             ahead, middle = angle + 0.5 * h * rate, 0.5 * (was + stage)
             found, slid = self.model.pull(ahead.ravel(), middle.reshape(-1, 2), sliders)
             torque, stiffness, damping = (part.reshape(angle.shape) for part in found)
-            damping = damping + self.damping
+            damping = damping + self.motion.damping
             net = torque + state.disturbance - self.gravity.torque(ahead, view.payload)
             left = mass + (0.5 * h * damping + 0.25 * h * h * stiffness)[..., None] * unit
             gained = _solved(left, h * (net - damping * rate))
@@ -241,7 +289,7 @@ class JointPredictive(RowController):
         """Return the mass matrices [kg m2] of the rows, shape (n_env, n_joints, n_joints)."""
 
         def repeated(load: float, rows: Array) -> Array:
-            return np.repeat(self.mass(load)[None], len(rows), axis=0)
+            return np.repeat(self.motion.mass(load)[None], len(rows), axis=0)
 
         return np.asarray(by_load(payload, repeated, payload))
 
@@ -249,7 +297,9 @@ class JointPredictive(RowController):
         """Return the gains of observer and regulator of the rows."""
 
         def repeated(load: float, rows: Array) -> tuple[Array, ...]:
-            return tuple(np.repeat(part[None], len(rows), axis=0) for part in self.gains(load))
+            return tuple(
+                np.repeat(part[None], len(rows), axis=0) for part in self.motion.gains(load)
+            )
 
         observer, regulator = by_load(payload, repeated, payload)
         return observer, regulator
@@ -319,7 +369,7 @@ class JointPredictive(RowController):
         weight = self.gravity.torque(nodes.reshape(-1, shape[1]), payload).reshape(nodes.shape)
         torque = np.moveaxis(weight, 1, 2) - rubs.reshape(shape)
         torque = torque + (demand.feedback - then.disturbance)[..., None]
-        damping = self.damping + model.damping - self.lead * model.stiffness
+        damping = self.motion.damping + model.damping - self.lead * model.stiffness
         torque = torque + damping[:, None] * demand.rate
         pushed = self._masses(view.payload)[..., None] * demand.acceleration[:, None]
         torque = torque + np.add.reduce(pushed, axis=2)
@@ -377,41 +427,16 @@ def make_joint_predictive(spec: Spec[Any]) -> JointPredictive | ModelFollowing:
     signals, model = make_joint_signal_map(spec.signals, spec.actions), PairModel(plant)
     names = [""] if plant.stages == 1 else [str(k) for k in range(plant.stages)]
     muscles = [f"pressure_{name}{muscle}" for name in names for muscle in "ab"]
-    mass, gravity, damping = cache(_mass_of(plant)), Gravity(plant), np.zeros(plant.stages)
-    if plant.stages > 1:
-        damping = plant.arm.damping_factor * np.array(plant.joint_damping)
-    noise = max(LEAST_NOISE, math.hypot(plant.angle.noise, plant.angle.resolution / 12**0.5))
-    steps = (spec.knob("observer") * RATE_STEP, spec.knob("observer") * TORQUE_STEP)
-
-    @cache
-    def gains(payload: float) -> tuple[Array, Array]:
-        turns, held = GRADIENT * np.eye(plant.stages), np.full(plant.stages, payload)
-        weight = gravity.torque(turns, held) - gravity.torque(-turns, held)
-        stiffness = model.stiffness * np.eye(plant.stages) + weight / (2.0 * GRADIENT)
-        motion = LinearMotion.make(mass(payload), model.damping + damping, stiffness, period)
-        regulator = motion.regulator(spec.knob("feedback") * model.stiffness)
-        return motion.observer(noise, *steps), regulator
-
     return JointPredictive(
         model,
         signals,
-        gravity,
+        Gravity(plant),
         reader(spec.signals, muscles),
         PreviewMemory.make(np.array([round(time / period) for time in signals.times])),
         RegulatorBank.make(plant, adaptive=True),
-        mass,
-        gains,
-        damping,
+        StraightMotion(plant, model, spec.knob("observer"), spec.knob("feedback")),
         spec.knob("lead") * LEAD * model.damping / model.stiffness,
     )
-
-
-def _mass_of(plant: Any) -> Callable[[float], Array]:
-    """Return the mass matrix [kg m2] of straight joints as a function of the payload [kg]."""
-    if plant.stages > 1:
-        return lambda payload: plant.chain.mass_matrix(np.zeros(plant.stages), payload)
-    link = plant.link
-    return lambda payload: np.array([[link.inertia + payload * link.length**2]])
 
 
 ENTRIES = {

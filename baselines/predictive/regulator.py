@@ -80,6 +80,14 @@ class BankState(NamedTuple):
     deviation: Array
     commands: Array
 
+    def grouped(self, count: int) -> "BankState":
+        """Return the state of ``count`` regulators an environment, first axes (n_env, count)."""
+        return BankState(*(part.reshape(-1, count, part.shape[-1]) for part in self))
+
+    def flat(self) -> "BankState":
+        """Return the state with one row for each regulator, from :meth:`grouped`."""
+        return BankState(*(part.reshape(-1, part.shape[-1]) for part in self))
+
 
 class Arrival(NamedTuple):
     """Regulator in use of each row: pressures [Pa] until a setpoint of now takes effect.
