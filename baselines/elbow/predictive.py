@@ -67,7 +67,7 @@ class ElbowState(NamedTuple):
     mean : ndarray, shape (n_env, 3)
         Means of angle [rad], torque [N m] and stiffness [N m/rad] of the references.
     spread : ndarray, shape (n_env, 3)
-        Covariances of the angle with the three.
+        Covariances [rad2, rad N m and N m] of the angle with the three.
     """
 
     bank: BankState
@@ -83,12 +83,14 @@ class ElbowPredictive(RowController):
 
     Attributes
     ----------
-    step, gains : ndarray, shapes (3, 3) and (3,)
-        Motion over a period, and gains of the filter.
+    step : ndarray, shape (3, 3)
+        Motion [SI] over a period.
+    gains : ndarray, shape (3,)
+        Gains [1, 1/s and 1/s2] of the filter.
     lead : float
         Factor on the time until a setpoint takes effect.
     share : float
-        Weight of the newest reading in the regression.
+        Weight [1] of the newest reading in the regression.
     """
 
     signals: ElbowSignalMap

@@ -203,9 +203,9 @@ class PairModel:
     @staticmethod
     def fits(plant: Any) -> bool:
         """Return whether a plant has muscles, with friction driven by length or without any."""
-        law = plant.hysteresis
-        known = law.operator is None or isinstance(law.model, SlipModel)
-        return plant.dynamics == "muscles" and known
+        if not isinstance(plant, PairPlant) or getattr(plant, "dynamics", "") != "muscles":
+            return False
+        return plant.hysteresis.operator is None or isinstance(plant.hysteresis.model, SlipModel)
 
     # --- setpoints ------------------------------------------------------------------------------
 

@@ -98,7 +98,7 @@ class PredictiveState(NamedTuple):
     pressure : ndarray, shape (n_env, n_joints, 2)
         Estimated pressures [Pa] of the muscles.
     sliders : ndarray, shape (n_env, n_joints, 2, elements)
-        State of the friction.
+        Positions [1] of the friction's sliders.
     angle, rate, disturbance : ndarray, shape (n_env, n_joints)
         Estimates [rad], [rad/s], [N m].
     shortfall : ndarray, shape (n_env, n_joints)

@@ -63,11 +63,11 @@ def test_javascript_class_gives_the_same_bits(case, exported: Path) -> None:
     assert differing(np.array(words, np.uint64).view(float), case.reference) == 0
 
 
+pytestmark = pytest.mark.xdist_group("exported_wasm")  # each module is built once
+
 CHECK = """
 import {{ readFileSync }} from "node:fs";
 import {{ Model, parameters }} from "./{name}.mjs";
-
-pytestmark = pytest.mark.xdist_group("exported_wasm")  # each module is built once
 
 const model = await Model.create(readFileSync("./{name}.wasm"));
 const at = () => model.get("info.state/pressure");

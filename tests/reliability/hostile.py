@@ -196,7 +196,7 @@ def board(number: int, folder: Path) -> Iterator[tuple[str, int, Counter[Outcome
     from benchmarks.board import accessors, leaderboard, site
     from benchmarks.runs import rows, store, verified
 
-    track = "elbow_nominal"
+    track = "positioning_nominal"
     shutil.copytree(rows.RESULTS / track, folder / track)
     for path in sorted((folder / track).iterdir())[3:]:
         path.unlink()

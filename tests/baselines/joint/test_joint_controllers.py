@@ -23,7 +23,7 @@ from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
-BOUND = ("_gravity", "_ahead", "_kinematics", "_dob")
+BOUND = ("_gravity", "_ahead", "_kinematics", "_dob", "_predictive")
 """Suffixes of controllers that need the weight or the chain of the plant."""
 NAMES = [n for n, e in PUBLISHED.items() if JOINT[0] in e.envs and not n.endswith(BOUND)]
 RIG = ReducedRig()
