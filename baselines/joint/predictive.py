@@ -83,7 +83,7 @@ COMPENSATION_DAMPING = 0.02
 """Damping of the least squares [m/rad]."""
 GRADIENT = 1e-4
 """Angle [rad] for the stiffness of the weight."""
-KNOBS: Bounds = {"lead": (0.1, 4.0), "observer": (0.1, 10.0), "feedback": (0.1, 6.0)}
+KNOBS: Bounds = {"lead": (0.1, 4.0), "observer": (0.03, 10.0), "feedback": (0.1, 6.0)}
 """Factors on the lead, on the observer's noise of rate and disturbance, and on the regulator's
 weight of a deviation."""
 
