@@ -285,31 +285,29 @@ class KneeAnticipation(RowController):
         if self.torque is None:
             return np.zeros_like(ends)
         nominal, n = self.observer.nominal, len(ends)
-        lever, last = nominal.plant.lever, math.ceil(ends.max())
+        lever, last = nominal.plant.lever, math.ceil(ends.max()) + 1
         times = np.arange(-1.0, last + 2.0)
         samples, _ = self._ahead(now, np.tile(times, (n, 1)))
         here = now.wearer[:, [0, 2]].sum(axis=1)[:, None]
         path, stance = samples[:, 1], self._in_stance(samples[:, 0], samples[:, 1], now)
-        torque = self._leg.passive(path)[:, :last]
+        halves = np.arange(last) + 0.5
+        torque = np.stack([np.interp(halves, ends[i] - 1.0, now.torque[i]) for i in range(n)])
         middle = 0.5 * (path[:, 1:-2] + path[:, 2:-1]) + here
-        until, hysteresis = len(arrival.pressures), now.hysteresis
-        gain = now.moments[:, 1] / now.moments[:, 0]
+        hysteresis, gain = now.hysteresis, now.moments[:, 1] / now.moments[:, 0]
         for k, pressure in enumerate(arrival.pressures):
             stiffness = np.maximum(nominal.stiffness_after(pressure, hysteresis), 0.0)
             hysteresis = nominal.advance(pressure, hysteresis)
             tension = gain * stiffness * nominal.stretch(middle[:, k])
             given = lever.torque(tension, middle[:, k])
-            torque[:, k] += given
-        for i in range(n):
-            at = np.arange(until, last) + 0.5
-            torque[i, until:] += np.interp(at, ends[i] - 1.0, now.torque[i])
+            torque[:, k] = np.where(k < arrival.delay, given, torque[:, k])
+        torque = torque + self._leg.passive(path)[:, :last]
         sensed = self._leg.load(self.torque.rows(observation)[1])[:, None]
         begins = stance[:, 2:-1] & ~view.stance[:, None]
         load = np.where(begins, CONTACT, sensed)
         course = self._leg.along(now.wearer[:, :2], torque, load)[..., 0]
         ratio = now.yielding[..., 1] / now.yielding[..., 0]
         course = course * np.where(stance[:, 1:-1], ratio[:, 1:], ratio[:, :1])
-        whole = np.minimum(np.floor(ends).astype(np.int64), last - 1)
+        whole = np.floor(ends).astype(np.int64)
         low = np.take_along_axis(course, whole, axis=1)
         high = np.take_along_axis(course, whole + 1, axis=1)
         off = low + (ends - whole) * (high - low) + now.wearer[:, 2:]
