@@ -31,6 +31,20 @@ def with_bearing(component: str, breaks: Sequence[float]) -> tuple[Cause, ...]:
     return (*(c for c in catalogue() if c.name != guide.name), bearing)
 
 
+def with_correction(
+    causes: Sequence[Cause], component: str, orders: Sequence[tuple[int, int]]
+) -> tuple[Cause, ...]:
+    """Return causes whose static law is the correction of a component.
+
+    ``orders`` are the orders in pressure and strain of its terms.
+    """
+    law = by_name("static_law")
+    (form,) = law.forms
+    terms = tuple(replace(form.terms[0], name=f"{component}.map_{p}{e}") for p, e in orders)
+    corrected = replace(law, forms=(replace(form, terms=terms),))
+    return tuple(corrected if cause.name == law.name else cause for cause in causes)
+
+
 def adapted(
     causes: Sequence[Cause],
     plant: Any,

@@ -9,8 +9,9 @@ from pam_envs.arrays import Array
 from pam_envs.constants import BAR, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.cause import Cause, Form, Term
-from pam_envs.diagnosis.families.adapted import with_bearing
+from pam_envs.diagnosis.families.adapted import with_bearing, with_correction
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
+from pam_envs.diagnosis.fit.single_muscle import grouped
 from pam_envs.diagnosis.plant_protocol import Signals
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import FROM_THEM
@@ -20,6 +21,7 @@ MUSCLES: dict[str, dict[str, Any]] = REGULATOR | {
     "muscle.taper": {"scale": 0.1, "prior": 60.0},
     "muscle.threshold": {"scale": 5.0, "prior": 60.0},
     "muscle.braid_force": {"scale": 5.0, "prior": 60.0},
+    "muscle.braid_strain": {"log": True, "prior": 1.0},
     "muscle.stiffness": {"scale": 50.0, "prior": 60.0},
     "muscle.viscosity": {"scale": 5e-5, "prior": 60.0},
     "hysteresis.base": {"log": True, "low": 1.0, "prior": 1.5},
@@ -59,6 +61,11 @@ UNEQUAL = Cause(
 )
 BREAKS = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
 """Breakaway torques [N m] at which the search for a sticking bearing begins."""
+CORRECTED = (
+    *((0, 2), (0, 3), (0, 4), (1, 2), (1, 3)),
+    *((2, 0), (2, 1), (2, 2), (3, 0), (3, 1)),
+)
+"""Orders in pressure and strain of the terms that the law of the muscles lacks, up to order 4."""
 PAIRS = {"set_point_a": "pressure_a", "set_point_b": "pressure_b"}
 
 
@@ -77,7 +84,39 @@ def difference_of(
     )
 
 
-class BoundJoint(RegulatedFamily):
+class PairFamily(RegulatedFamily):
+    """Plant whose joints have pairs of muscles, all alike."""
+
+    law: ClassVar[str] = "muscle"
+
+    def joint_channels(self) -> list[tuple[str, tuple[str, str]]]:
+        """Return the channel of each joint's angle, and those of its pressures."""
+        return [("angle", ("pressure_a", "pressure_b"))]
+
+    def recorded_states(self, measured: Array) -> Array:
+        """Return groups of pressures [Pa] and strains of all muscles, (2, k)."""
+        plant, place = self.plant, self.channels.index
+        strains, pressures = [], []
+        for angle, pair in self.joint_channels():
+            strain = plant.lever.contraction(measured[place(angle)], plant.muscle.rest_length)
+            strains += list(strain.T)
+            pressures += [measured[place(name)] for name in pair]
+        return grouped(np.concatenate(strains), np.concatenate(pressures), slack=False)
+
+    def law_slopes(self, columns: Array, pressure: Array, strain: Array) -> tuple[Array, ...]:
+        """Return slopes of the laws of columns (n, p), without correction, at states (k,)."""
+
+        def value(name: str) -> Array:
+            return columns[:, [self.plant.names.index(f"muscle.{name}")]]
+
+        area, stretch, width = value("area"), value("stretch"), value("braid_strain")
+        e = strain / stretch
+        braid = value("braid_force") / width * np.exp(-e / width)
+        stiff = (area * value("taper") * pressure + braid + value("stiffness")) / stretch
+        return stiff, area * (1.0 - value("taper") * e), area
+
+
+class BoundJoint(PairFamily):
     """Joint with the inputs of a recording."""
 
     channels: ClassVar[tuple[str, ...]] = (
@@ -104,7 +143,10 @@ class JointKind(RegulatedKind):
     renamed = ({"position": "angle", "mass": "link"},)
     factors = FACTORS
     titles = TITLES
-    catalogue = (*with_bearing("link", BREAKS), UNEQUAL)
+    catalogue = (
+        *with_correction(with_bearing("link", BREAKS), "muscle", CORRECTED),
+        UNEQUAL,
+    )
 
     def drives(
         self, plant: Any, recording: Recording, set_points: Sequence[Array]

@@ -9,6 +9,7 @@ from typing import Any
 
 from pam_envs.constants import DENSITY_PER_PRESSURE
 from pam_envs.kernels.build import LANES, kernel
+from pam_envs.muscle.law_correction import correction_force, correction_slope
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.pair import (
     N_PAIRS,
@@ -92,6 +93,18 @@ def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def corrected_force(fixed: Any, j: int, pressure: float, contraction: float) -> float:
+    """Return the force [N] of the law's correction at an effective pressure [Pa]."""
+    return correction_force(fixed, j, PAIR.law, pressure, contraction)  # type: ignore[no-any-return]
+
+
+@kernel
+def corrected_stiffness(fixed: Any, j: int, pressure: float, contraction: float) -> float:
+    """Return minus the derivative of :func:`corrected_force` by contraction [N]."""
+    return correction_slope(fixed, j, PAIR.law, pressure, contraction)  # type: ignore[no-any-return]
+
+
+@kernel
 def leaked_air(rows: Any, fixed: Any, j: int) -> float:
     """Return the air [kg] that leaked from all muscles of lane ``j`` in this control period."""
     leaked = 0.0
@@ -145,4 +158,5 @@ def pair_kernels(kind: str, layout: Any, pairs: int, effects: int | None) -> dic
     begin = begin_paths_and_bearing if "bearing" in block._fields else begin_paths
     air = {"settle_air": settle_air, "begin_enclosed": begin_enclosed}
     air |= {"enclosed_stiffness": enclosed_stiffness, "leaked_air": leaked_air}
+    air |= {"more_force": corrected_force, "more_stiffness": corrected_stiffness}
     return found | shown | air | {"regulate": regulate_extended, "begin_muscles": begin}

@@ -13,6 +13,7 @@ from typing import Any
 
 from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.mechanics.guide import GUIDE
+from pam_envs.muscle.law_correction import FIELDS
 from pam_envs.parameters import row_blocks
 from pam_envs.plants.core.muscle_path import PATH_NAMES, WARM
 from pam_envs.sensing.sensor import SENSOR
@@ -37,16 +38,18 @@ def signal_rows(rows: Any, names: str) -> dict[str, int]:
 
 
 def path_effects(
-    *muscles: str, bearing: str | None = None, sensors: tuple[str, ...]
+    *muscles: str, bearing: str | None = None, sensors: tuple[str, ...], law: str | None = None
 ) -> dict[str, tuple[str, ...]]:
-    """Return the names of the effects of muscle paths, a bearing and sensors, by block.
+    """Return the names of the effects of muscle paths, a bearing, sensors and a law, by block.
 
-    ``muscles`` are the components that have a temperature each (see ``core.muscle_path``).
+    ``muscles`` are the components that have a temperature each (see ``core.muscle_path``), ``law``
+    is that with the correction of the static law.
     """
     rubs = {"bearing": dotted(**{bearing: " ".join(GUIDE._fields)})} if bearing else {}
     warm = {"warm": dotted(**dict.fromkeys(muscles, " ".join(WARM._fields)))}
     shown = {sensor: dotted(**{sensor: " ".join(SENSOR._fields)}) for sensor in sensors}
-    return {"path": PATH_NAMES} | warm | rubs | shown
+    maps = {"law": dotted(**{law: " ".join(FIELDS)})} if law else {}
+    return {"path": PATH_NAMES} | warm | rubs | shown | maps
 
 
 def layout(
