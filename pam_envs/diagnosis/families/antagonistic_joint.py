@@ -10,9 +10,11 @@ from pam_envs.constants import BAR, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.families.adapted import with_bearing, with_correction
+from pam_envs.diagnosis.families.pair_balance import PairBalance
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
 from pam_envs.diagnosis.fit.single_muscle import grouped
 from pam_envs.diagnosis.plant_protocol import Signals
+from pam_envs.plants.antagonistic_joint.hysteresis import REFERENCE_PRESSURE
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import FROM_THEM
 
@@ -102,6 +104,42 @@ class PairFamily(RegulatedFamily):
             strains += list(strain.T)
             pressures += [measured[place(name)] for name in pair]
         return grouped(np.concatenate(strains), np.concatenate(pressures), slack=False)
+
+    def guesses(
+        self, measured: Array, noise: Array, column: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Return starting values from the balance of torques, without and with the correction."""
+        joints = self.joint_channels()
+        place = self.channels.index
+        angles = measured[[place(angle) for angle, _ in joints]]
+        if not hasattr(self.plant.hysteresis.operator, "thresholds") or np.any(
+            np.isfinite(angles).sum(axis=1) < len(angles.T) // 2
+        ):
+            return {}, {}
+        gauges = [place(name) for _, pair in joints for name in pair]
+        pressures = np.maximum(0.0, self.simulate(column[None])[gauges, :, 0])
+        known = np.nan_to_num(angles)
+        own, whole = (self.weights_at(known, mass) for mass in (0.0, self.payload()))
+        size = float(noise[place(joints[0][0])])
+        made = PairBalance(
+            *(self.plant, REFERENCE_PRESSURE, angles, size, pressures, own, whole - own),
+            *(CORRECTED, self.period),
+        ).solve()
+        return tuple(map(self.named, made))  # type: ignore[return-value]
+
+    def payload(self) -> Array:
+        """Return the payload [kg], (T,)."""
+        names = list(self.plant.module("rollout").channels_of(self.plant))
+        return np.asarray(self.drives[names.index("payload"), :, 0])
+
+    def weights_at(self, angles: Array, payload: Array | float) -> Array:
+        """Return the torques of weight and payload [kg] at angles (n, T) [rad], (n, T)."""
+        return np.asarray(self.plant.weight_torque(angles, payload))
+
+    def named(self, found: dict[str, float]) -> dict[str, float]:
+        """Return a guess whose factor on the own weight is that on a parameter."""
+        factor = found.pop("weight", 1.0)
+        return {**found, "link.centre": factor * self.plant.link.centre} if found else {}
 
     def law_slopes(self, columns: Array, pressure: Array, strain: Array) -> tuple[Array, ...]:
         """Return slopes of the laws of columns (n, p), without correction, at states (k,)."""

@@ -134,6 +134,15 @@ class CompiledFamily:
     def tie(self, columns: Array) -> None:
         """Complete columns: none needs it."""
 
+    def guesses(
+        self, measured: Array, noise: Array, column: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Return starting values of the base, and of the base with its common differences.
+
+        From readings (channels, T) with a noise (channels,), and a column with their regulator.
+        """
+        return {}, {}
+
     def spanning(self, measured: Array) -> "CompiledFamily":
         """Return the family for readings (channels, T), NaN where there is none."""
         return self
@@ -312,6 +321,7 @@ def calibrate_compiled(
     problem = dataclasses.replace(
         problem, simulate=family.simulate, tie=family.tie, violations=family.violations
     )
-    start = start_at_guess(family.base(), dict(found))
-    base = fit_base(problem, blocks, column, [start], ROUNDS)
-    return Calibration(family, problem, base, dict(found), None)
+    law, wide = family.guesses(measured, noise, column)
+    starts = [start_at_guess(family.base(), {**found, **more}) for more in ({}, law)]
+    base = fit_base(problem, blocks, column, starts if law else starts[:1], ROUNDS)
+    return Calibration(family, problem, base, {**found, **law, **wide}, None)

@@ -54,6 +54,15 @@ class BoundArm(PairFamily):
         joints = range(self.plant.stages)
         return [(f"angle_{k}", (f"pressure_{2 * k}", f"pressure_{2 * k + 1}")) for k in joints]
 
+    def weights_at(self, angles: Array, payload: Array | float) -> Array:
+        """Return the torques of weight and payload [kg] at angles (n, T) [rad], (n, T)."""
+        return np.moveaxis(self.plant.weight_torque(angles.T, payload), -1, 0)
+
+    def named(self, found: dict[str, float]) -> dict[str, float]:
+        """Return a guess whose factor on the own weight is that of the links' masses."""
+        factor = found.pop("weight", 1.0)
+        return {**found, "arm.mass_factor": factor} if found else {}
+
     def signal_rows(self) -> Mapping[str, int]:
         """Return the row of state of each torque and force."""
         n = self.plant.stages
