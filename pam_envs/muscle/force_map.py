@@ -25,9 +25,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
-from pam_envs.muscle.effects import TemperatureEffects
+from pam_envs.muscle.effects import LengthYieldEffects, TemperatureEffects
 from pam_envs.muscle.law_correction import FIELDS, LawCorrection
-from pam_envs.parameters import assumed, derived, identified, published
+from pam_envs.parameters import assumed, declarations, derived, identified, published
 
 _FIT = "least squares on the measured map of a DMSP-10-250 (data/dmsp10_force_map.csv)"
 FULL_PRESSURE = 6.5e5
@@ -37,7 +37,7 @@ PAPER_CONTRACTION = 0.25
 
 
 @dataclass(frozen=True)
-class ForceMap(LawCorrection, TemperatureEffects):
+class ForceMap(LawCorrection, LengthYieldEffects, TemperatureEffects):
     """Muscle DMSP-10-150N.
 
     ``stretch`` lengthens the axis of contraction. Inverses of the law do not use ``gain`` and
@@ -45,7 +45,11 @@ class ForceMap(LawCorrection, TemperatureEffects):
     law, muscle B ``gain (1 - imbalance)`` times. Nor do they use the correction of the law.
     """
 
-    effects: ClassVar[tuple[tuple[str, ...], ...]] = (*TemperatureEffects.effects, FIELDS)
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        *TemperatureEffects.effects,
+        tuple(declarations(LengthYieldEffects)),
+        FIELDS,
+    )
 
     area: float = identified(8.9128e-4, "m2", 1e-5, 1e-2, _FIT)
     taper: float = identified(3.0078, "1", 0.0, 10.0, _FIT)

@@ -45,6 +45,18 @@ def with_correction(
     return tuple(corrected if cause.name == law.name else cause for cause in causes)
 
 
+def with_yielding(causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    """Return causes whose shape of the loops is friction of the length that yields smoothly.
+
+    For plants whose friction is driven by length anyway.
+    """
+    shape, drive = by_name("hysteresis_shape"), by_name("hysteresis_drive")
+    form = next(form for form in drive.forms if form.name == "yielding")
+    made = replace(shape, forms=(form,))
+    kept = (cause for cause in causes if cause.name != drive.name)
+    return tuple(made if cause.name == shape.name else cause for cause in kept)
+
+
 def adapted(
     causes: Sequence[Cause],
     plant: Any,

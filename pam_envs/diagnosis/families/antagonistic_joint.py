@@ -9,7 +9,11 @@ from pam_envs.arrays import Array
 from pam_envs.constants import BAR, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.cause import Cause, Form, Term
-from pam_envs.diagnosis.families.adapted import with_bearing, with_correction
+from pam_envs.diagnosis.families.adapted import (
+    with_bearing,
+    with_correction,
+    with_yielding,
+)
 from pam_envs.diagnosis.families.pair_balance import PairBalance
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
 from pam_envs.diagnosis.fit.single_muscle import grouped
@@ -182,7 +186,7 @@ class JointKind(RegulatedKind):
     factors = FACTORS
     titles = TITLES
     catalogue = (
-        *with_correction(with_bearing("link", BREAKS), "muscle", CORRECTED),
+        *with_yielding(with_correction(with_bearing("link", BREAKS), "muscle", CORRECTED)),
         UNEQUAL,
     )
 

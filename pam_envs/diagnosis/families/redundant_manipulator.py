@@ -14,7 +14,7 @@ from pam_envs.arrays import Array
 from pam_envs.data.recording.channels import arm_channels
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.families.adapted import with_correction
+from pam_envs.diagnosis.families.adapted import with_correction, with_yielding
 from pam_envs.diagnosis.families.antagonistic_joint import (
     CORRECTED,
     MUSCLES,
@@ -84,7 +84,7 @@ class ArmKind(JointKind):
 
     plant = RedundantManipulator
     bound = BoundArm
-    catalogue = (*with_correction(catalogue(), "muscle", CORRECTED), UNEQUAL)
+    catalogue = (*with_yielding(with_correction(catalogue(), "muscle", CORRECTED)), UNEQUAL)
 
     def pairs_of(self, plant: Any) -> Mapping[str, str]:
         """Return the name of each setpoint and that of its pressure."""

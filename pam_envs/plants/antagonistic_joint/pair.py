@@ -49,11 +49,12 @@ def pair_rows(layout: Any, effects: int | None) -> Any:
     found = {n: getattr(layout, n.upper(), None) for n in ROWS.split()}
     found = {n: getattr(layout, f"{n.upper()}_A") if r is None else r for n, r in found.items()}
     if effects is None:
-        found |= {"effective": found["pressure"], "paths": 0}
+        found |= {"effective": found["pressure"], "paths": 0, "deflection": 0, "yielded": 0}
     else:
         own = layout.STATE
         found |= {"effective": effects + own.effective, "paths": effects + own.paths}
-    found |= {name: getattr(layout.EFFECT, name) for name in ("path", "warm", "law")}
+        found |= {"deflection": effects + own.deflection, "yielded": effects + own.yielded}
+    found |= {name: getattr(layout.EFFECT, name) for name in ("path", "warm", "law", "soft")}
     return namedtuple("PairRows", tuple(found))(**found)
 
 
@@ -178,6 +179,16 @@ def write_limits(
 
 
 @kernel
+def peek_yield(rows: Any, fixed: Any, m: int, operators: int, first: int, last: int) -> None:
+    """Add the lags of yielding friction, which does not move: a plain plant has none."""
+
+
+@kernel
+def move_yield(rows: Any, fixed: Any, m: int, operators: int, first: int, last: int) -> None:
+    """Move yielding friction and add its lags: a plain plant has none."""
+
+
+@kernel
 def lag_of(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, operators: int,
     first: int, last: int,
@@ -188,6 +199,7 @@ def lag_of(
         rows, fixed, counts, table, hysteresis, elements, PAIR.at, PAIR.lag, operators, PAIR.model,
         K.STACK_COUNT, K.MEMBER, first, last,
     )  # fmt: skip
+    move_yield(rows, fixed, 0, operators, first, last)
 
 
 @kernel
@@ -201,6 +213,7 @@ def peek_at(
         rows, fixed, counts, table, hysteresis, elements, PAIR.at + m, PAIR.lag + m,
         PAIR.stick + m, operators, PAIR.model, K.STACK_COUNT + m, K.MEMBER, first, last,
     )  # fmt: skip
+    peek_yield(rows, fixed, m, operators, first, last)
 
 
 @kernel
