@@ -14,6 +14,7 @@ from pam_envs.diagnosis.families.adapted import (
     with_correction,
     with_yielding,
 )
+from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.pair_balance import PairBalance
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
 from pam_envs.diagnosis.fit.single_muscle import grouped
@@ -30,8 +31,8 @@ MUSCLES: dict[str, dict[str, Any]] = REGULATOR | {
     "muscle.braid_strain": {"log": True, "prior": 1.0},
     "muscle.stiffness": {"scale": 50.0, "prior": 60.0},
     "muscle.viscosity": {"scale": 5e-5, "prior": 60.0},
-    "hysteresis.base": {"log": True, "low": 1.0, "prior": 1.5},
-    "hysteresis.rate": {"log": True, "low": 1e-6, "prior": 1.5},
+    "hysteresis.base": {"log": True, "low": 50.0, "prior": 1.5},
+    "hysteresis.rate": {"log": True, "low": 3e-4, "prior": 1.5},
 }
 """Parameters of regulators and muscles with the settings of their fits that differ from the
 declarations."""
@@ -72,6 +73,8 @@ CORRECTED = (
     *((2, 0), (2, 1), (2, 2), (3, 0), (3, 1)),
 )
 """Orders in pressure and strain of the terms that the law of the muscles lacks, up to order 4."""
+LEAST_BREAK = 2e-3
+"""Least strain over which yielding friction builds up, where a fit starts."""
 PAIRS = {"set_point_a": "pressure_a", "set_point_b": "pressure_b"}
 
 
@@ -109,27 +112,41 @@ class PairFamily(RegulatedFamily):
             pressures += [measured[place(name)] for name in pair]
         return grouped(np.concatenate(strains), np.concatenate(pressures), slack=False)
 
-    def guesses(
-        self, measured: Array, noise: Array, column: Array
-    ) -> tuple[dict[str, float], dict[str, float]]:
-        """Return starting values from the balance of torques, without and with the correction."""
+    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
+        """Return starting values of the base from the balance of torques."""
         joints = self.joint_channels()
         place = self.channels.index
         angles = measured[[place(angle) for angle, _ in joints]]
         if not hasattr(self.plant.hysteresis.operator, "thresholds") or np.any(
             np.isfinite(angles).sum(axis=1) < len(angles.T) // 2
         ):
-            return {}, {}
+            return {}
         gauges = [place(name) for _, pair in joints for name in pair]
         pressures = np.maximum(0.0, self.simulate(column[None])[gauges, :, 0])
         known = np.nan_to_num(angles)
         own, whole = (self.weights_at(known, mass) for mass in (0.0, self.payload()))
         size = float(noise[place(joints[0][0])])
-        made = PairBalance(
-            *(self.plant, REFERENCE_PRESSURE, angles, size, pressures, own, whole - own),
-            *(CORRECTED, self.period),
-        ).solve()
-        return tuple(map(self.named, made))  # type: ignore[return-value]
+        data = (self.plant, REFERENCE_PRESSURE, angles, size, pressures, own, whole - own)
+        return self.named(PairBalance(*data, self.period).solve())
+
+    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
+        """Return starting values at which all friction yields smoothly."""
+        names = [name for name in found if name.startswith(WEIGHT)]
+        thresholds = getattr(self.plant.hysteresis.operator, "thresholds", ())
+        weights = np.array([found[name] for name in names])
+        if not names or weights.sum() <= 0.0:
+            return dict(found)
+        slip = float(weights @ np.array(thresholds))  # [1], over the stiffness of the friction
+        base, rate = found["hysteresis.base"], found["hysteresis.rate"]
+        away = slip / float(weights.sum()) * base / (base + rate * REFERENCE_PRESSURE)
+        return {
+            **found,
+            **dict.fromkeys(names, 0.0),
+            "muscle.yield_force": base * slip,
+            "muscle.yield_per_pressure": rate * slip,
+            "muscle.yield_break": max(away, LEAST_BREAK),
+            "muscle.yield_ratio": 0.5,
+        }
 
     def payload(self) -> Array:
         """Return the payload [kg], (T,)."""

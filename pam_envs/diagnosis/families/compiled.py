@@ -134,14 +134,16 @@ class CompiledFamily:
     def tie(self, columns: Array) -> None:
         """Complete columns: none needs it."""
 
-    def guesses(
-        self, measured: Array, noise: Array, column: Array
-    ) -> tuple[dict[str, float], dict[str, float]]:
-        """Return starting values of the base, and of the base with its common differences.
+    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
+        """Return starting values of the base.
 
         From readings (channels, T) with a noise (channels,), and a column with their regulator.
         """
-        return {}, {}
+        return {}
+
+    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
+        """Return starting values of the flexible base from the fitted values of the base."""
+        return dict(found)
 
     def spanning(self, measured: Array) -> "CompiledFamily":
         """Return the family for readings (channels, T), NaN where there is none."""
@@ -321,7 +323,7 @@ def calibrate_compiled(
     problem = dataclasses.replace(
         problem, simulate=family.simulate, tie=family.tie, violations=family.violations
     )
-    law, wide = family.guesses(measured, noise, column)
+    law = family.guess(measured, noise, column)
     starts = [start_at_guess(family.base(), {**found, **more}) for more in ({}, law)]
     base = fit_base(problem, blocks, column, starts if law else starts[:1], ROUNDS)
-    return Calibration(family, problem, base, {**found, **law, **wide}, None)
+    return Calibration(family, problem, base, family.flexible_guess(base.fit.values()), None)

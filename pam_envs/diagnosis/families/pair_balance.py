@@ -24,7 +24,6 @@ from pam_envs.diagnosis.fit.balance import (
     slipping,
     without_jitter,
 )
-from pam_envs.diagnosis.fit.single_muscle import map_of
 
 SLOW = 0.15  # speed [rad/s] below which a sample is an equilibrium of torques
 SETTLED = 0.06  # slow way [rad] after which the friction has forgotten a fast motion
@@ -34,7 +33,6 @@ ROUNDS = 4
 TAUT = 1.0  # least force [N] of a muscle that is not slack
 CLEARLY = 8e4  # pressure [Pa] above which a muscle is taken for taut at first
 LEAST_STIFF = 0.3  # least stiffness of a weight, over the median
-MAP_PRIOR = 4.0  # standard deviation of a term of the map [N]
 BRAIDS = (0.01, 0.02, 0.04, 0.08)
 """Tried strains over which the resistance of the braid builds up."""
 GROWTHS = (0.0, 1e-6, 3e-6, 1e-5, 1e-4)
@@ -61,8 +59,6 @@ class PairBalance:
         Of the muscles [Pa].
     weight, carried : ndarray, shape (n, T)
         Torque [N m] of the plant's own weight and of the payload, which oppose the muscles.
-    orders : sequence of tuple of int
-        Orders in pressure and strain of the map's terms.
     period : float
         Sampling period [s].
     """
@@ -74,7 +70,6 @@ class PairBalance:
     pressure: Array
     weight: Array
     carried: Array
-    orders: tuple[tuple[int, int], ...]
     period: float
 
     @cached_property
@@ -126,13 +121,6 @@ class PairBalance:
         e = strain / self.plant.muscle.stretch
         return np.array([p, -p * e, -np.ones_like(p), np.expm1(-e / braid), -e])
 
-    def _map(self) -> Array:
-        """Return the forces by term of the map, (terms, 2 n, T)."""
-        law = self.plant.muscle
-        strain = (self._geometry[0] - law.map_least).ravel()
-        found = map_of(law, self.pressure.ravel(), strain, self.orders)[0]
-        return np.asarray(found.reshape(len(self.orders), *self.pressure.shape))
-
     def _friction(self, growth: float) -> Array:
         """Return the forces by element of the friction, (elements, 2 n, T)."""
         thresholds = self.plant.hysteresis.operator.thresholds
@@ -143,26 +131,25 @@ class PairBalance:
                 slipping(np.ascontiguousarray(path), threshold * limit[m], made[k, m])
         return -made
 
-    def solve(self) -> tuple[dict[str, float], dict[str, float]]:
-        """Return parameters without and with the map; empty if slow samples are too few."""
-        if self._slow.sum() < FEWEST:
-            return {}, {}
-        plain = min((self._solved(b, g, False) for b, g in product(BRAIDS, GROWTHS)), key=_error)
-        wide = min((self._solved(b, g, True) for b, g in product(BRAIDS, GROWTHS)), key=_error)
-        return plain[1], wide[1]
+    def solve(self) -> dict[str, float]:
+        """Return parameters of law and friction; empty if slow samples are too few.
 
-    def _solved(self, braid: float, growth: float, mapped: bool) -> tuple[float, dict[str, float]]:
+        ``weight`` is the factor on the plant's own weight.
+        """
+        if self._slow.sum() < FEWEST:
+            return {}
+        return min((self._solved(b, g) for b, g in product(BRAIDS, GROWTHS)), key=_error)[1]
+
+    def _solved(self, braid: float, growth: float) -> tuple[float, dict[str, float]]:
         """Return the squared error over the noise, and the parameters."""
         rows = self._slow
-        parts = [self._law(braid), self._friction(growth)]
-        parts += [self._map()] if mapped else []
-        forces = np.concatenate(parts)[:, :, rows]
+        forces = np.concatenate([self._law(braid), self._friction(growth)])[:, :, rows]
         strain, rate, curve = (values[:, rows] for values in self._geometry)
         pressure = self.pressure[:, rows]
         taut = pressure > CLEARLY
         joints = len(self.angle)
         weight, carried = self.weight[:, rows], self.carried[:, rows]
-        limits, usual = self._limits(len(forces) + 1, mapped), self.plant.muscle.area
+        limits, usual = self._limits(len(forces) + 1), self.plant.muscle.area
         stiff = np.full(weight.shape, 1.0)
         error, c = np.inf, np.zeros(len(forces) + 1)
         for k in range(ROUNDS):
@@ -185,9 +172,9 @@ class PairBalance:
             steep = steep * rate**2 / self.plant.muscle.rest_length * taut
             turned = (steep + force * curve * taut).reshape(joints, 2, -1).sum(axis=1)
             stiff = np.maximum(turned + np.abs(weight), 1e-3)
-        return error, self._named(c, braid, growth, mapped)
+        return error, self._named(c, braid, growth)
 
-    def _limits(self, columns: int, mapped: bool) -> Limits:
+    def _limits(self, columns: int) -> Limits:
         """Return the limits of the coefficients."""
         limits = Limits(
             low=np.zeros(columns),
@@ -197,13 +184,10 @@ class PairBalance:
         )
         limits.low[-1], limits.high[-1] = SCALES
         limits.low[-2], limits.high[-2] = WEIGHTS
-        if mapped:
-            terms = slice(columns - 2 - len(self.orders), columns - 2)
-            limits.low[terms], limits.precision[terms] = -np.inf, MAP_PRIOR**-2
         return limits
 
-    def _named(self, c: Array, braid: float, growth: float, mapped: bool) -> dict[str, float]:
-        """Return the coefficients by parameter; ``weight`` is the factor on the own weight."""
+    def _named(self, c: Array, braid: float, growth: float) -> dict[str, float]:
+        """Return the coefficients by parameter."""
         area = max(float(c[0]), 1e-6)
         found = {f"muscle.{name}": float(v) for name, v in zip(LAW, c, strict=False)}
         found |= {"muscle.taper": found["muscle.taper"] / area, "muscle.braid_strain": braid}
@@ -213,9 +197,6 @@ class PairBalance:
         base = stiffness / (1.0 + growth * self.reference)
         found |= {"hysteresis.base": base, "hysteresis.rate": base * growth}
         found |= {f"hysteresis.weight[{k}]": float(v) / stiffness for k, v in enumerate(sizes)}
-        if mapped:
-            terms = zip(self.orders, c[len(LAW) + n : -1], strict=True)
-            found |= {f"muscle.map_{p}{e}": float(v) for (p, e), v in terms}
         return found | {"weight": float(c[-1])}
 
 
