@@ -65,6 +65,7 @@ UNEQUAL = Cause(
     needs=("contraction",),
     sensor="a load cell at either muscle",
     compensable=True,
+    common=True,
 )
 BREAKS = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
 """Breakaway torques [N m] at which the search for a sticking bearing begins."""
