@@ -64,7 +64,8 @@ class LawCorrection(StaticMapEffects):
         u = np.clip(2.0 * np.asarray(pressure, float) / self.map_pressure - 1.0, -1.0, 1.0)
         beyond = np.asarray(strain, float) - self.map_least
         s = np.clip(2.0 * beyond / self.map_strain - 1.0, -1.0, 1.0)
-        return np.asarray(chebval2d(*np.broadcast_arrays(u, s), sizes))
+        u, s = np.broadcast_arrays(u, s)
+        return np.asarray(chebval2d(u, s, sizes))
 
 
 FIELDS = tuple(declarations(LawCorrection))

@@ -31,9 +31,7 @@ def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
             record["truths"] = []
         spent["make_s"] = clock.perf_counter() - started
         started = clock.perf_counter()
-        found = diagnose(
-            recording, start_of(family), rig=sheet, closed_loop=False, progress=False
-        )
+        found = diagnose(recording, start_of(family), rig=sheet, closed_loop=False, progress=False)
         spent["runtime_s"] = clock.perf_counter() - started
         record |= outcome(found) | {"nature": list(BY_NATURE)}
     except Exception as error:

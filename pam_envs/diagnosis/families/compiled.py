@@ -324,6 +324,9 @@ def calibrate_compiled(
         problem, simulate=family.simulate, tie=family.tie, violations=family.violations
     )
     law = family.guess(measured, noise, column)
-    starts = [start_at_guess(family.base(), {**found, **more}) for more in ({}, law)]
-    base = fit_base(problem, blocks, column, starts if law else starts[:1], ROUNDS)
-    return Calibration(family, problem, base, family.flexible_guess(base.fit.values()), None)
+    starts = [start_at_guess(family.base(), dict(found))]
+    if law:
+        starts.append(start_at_guess(family.base(), {**found, **law}))
+    base = fit_base(problem, blocks, column, starts, ROUNDS)
+    guess = family.flexible_guess(base.fit.values())
+    return Calibration(family, problem, base, guess, None, linear=False)

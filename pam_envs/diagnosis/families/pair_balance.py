@@ -202,4 +202,3 @@ class PairBalance:
 
 def _error(solved: tuple[float, Mapping[str, float]]) -> float:
     return solved[0]
-

@@ -108,7 +108,7 @@ class RegulatedFamily(CompiledFamily):
 
     @cached_property
     def _correction_slopes(self) -> tuple[Array, Array]:
-        """Derivatives of the correction's terms by pressure and strain at the states, (terms, k)."""
+        """Derivatives of the correction's terms by pressure and strain, each (terms, k)."""
         law, (pressure, strain) = getattr(self.plant, self.law), self.states
         return map_of(law, pressure, strain - law.map_least, TERMS)[1:]
 

@@ -292,9 +292,7 @@ def map_of(
 
 
 RANGE = "map_pressure", "map_strain"
-UNUSED_MAP = {
-    f"muscle.{name}": getattr(EffectiveAreaMuscle, name) for name in RANGE
-}
+UNUSED_MAP = {f"muscle.{name}": getattr(EffectiveAreaMuscle, name) for name in RANGE}
 """Range of a map without terms."""
 
 

@@ -33,7 +33,11 @@ globals().update(
         | {"delay": 2 * DELAYED.end},
         (*STAGE, *dotted(link="length mass centre gyration gravity", nominal="pole stiffness")),
         path_effects(
-            *("muscle",), bearing="link", sensors=("angle", "pressure"), law="muscle", yields="muscle"
+            *("muscle",),
+            bearing="link",
+            sensors=("angle", "pressure"),
+            law="muscle",
+            yields="muscle",
         ),
         {
             **each("effective deflection yielded", 2),
