@@ -150,7 +150,7 @@ def _drawn(options: Options) -> list[Case]:
     if options.chosen == "mutilated":
         return mutilated.cases(options.offset)
     if options.each:
-        raise ValueError("--each is for the sets worlds and families; leave it out")
+        raise ValueError("--each is for the set worlds or families; leave it out")
     return cases(options.chosen, options.offset)
 
 

@@ -173,9 +173,9 @@ class FlexibleBase:
         needed: set[str] = set()  # the fewer others remain, the more they are
         while any(cause.common for cause, _ in model.causes):
             expected = self.expected(model)
-            limit = OBVIOUS if self.linear else np.inf
+            limit, clear = (OBVIOUS, CLEAR) if self.linear else (np.inf, np.inf)
             doubtful = {n for n, gain in expected.items() if gain <= limit and n not in needed}
-            smaller = without_each_cause(*data, model, doubtful, CLEAR)
+            smaller = without_each_cause(*data, model, doubtful, clear)
             losses = {name: self.loss(less, model) for name, less in smaller.items()}
             needed |= {name for name, loss in losses.items() if loss > CLEAR}
             least = min(losses, key=lambda name: losses[name], default="")
