@@ -554,7 +554,7 @@ def show(
 
 
 def diagnosis(
-    chosen: Literal["small", "tune", "final", "worlds", "mutilated"] = "small",
+    chosen: Literal["small", "tune", "final", "worlds", "families", "mutilated"] = "small",
     offset: int = 0,
     kind: tuple[str, ...] = (),
     name: tuple[str, ...] = (),
@@ -571,12 +571,13 @@ def diagnosis(
     """Benchmark the diagnosis on simulated rigs with hidden effects; an interrupted run resumes.
 
     Args:
-        chosen: Set of cases; "worlds" are rigs of fifteen other simulations, "mutilated" are
-            spoiled recordings.
-        offset: Number of the random draw of cases; development on the worlds uses one above 0.
+        chosen: Set of cases; "worlds" are rigs of fifteen other simulations, "families" those of
+            joints, orthoses and arms, "mutilated" are spoiled recordings.
+        offset: Number of the random draw of cases; development on worlds and families uses one
+            above 0.
         kind: Only cases of these kinds.
         name: Only cases with one of these hidden effects.
-        world: Only rigs of these worlds.
+        world: Only rigs of these worlds, of families as in "antagonistic_joint.braid".
         each: Only these kinds, and so many cases of each in each world (of single effects: of each
             effect), as in "--each single 1 clean 6".
         loops: Number of cases per cause that are run in closed loop on the hidden rig.
@@ -590,6 +591,8 @@ def diagnosis(
     from benchmarks.diagnosis import mutilated
     from benchmarks.diagnosis import report as telling
     from benchmarks.diagnosis import run as running
+    from benchmarks.diagnosis.families import page as families_page
+    from benchmarks.diagnosis.families.study import study as study_of_family
     from benchmarks.diagnosis.study import study
     from benchmarks.diagnosis.worlds import page as worlds_page
     from benchmarks.speed.diagnosis import timed as reports_timed
@@ -601,7 +604,8 @@ def diagnosis(
         *(chosen, offset, kind, name, loops, next, force, folder, computing, world, each or {})
     )
     with progress("cases") as start:
-        report = running.run(options, start, mutilated.study if chosen == "mutilated" else study)
+        acts = {"mutilated": mutilated.study, "families": study_of_family}
+        report = running.run(options, start, acts.get(chosen, study))
     print(f"{report.computed} computed, {report.found} were there already")
     for line in report.quarantined:
         print(f"corrupt, set aside and computed again: {line}")
@@ -609,10 +613,14 @@ def diagnosis(
         print(f"not made, counted apart: {line}")
     for line in report.failed:
         print(f"FAILED, counted as wrong: {line}", file=sys.stderr)
-    frozen = chosen in ("worlds", "mutilated") and offset == 0
+    frozen = chosen in ("worlds", "families", "mutilated") and offset == 0
     official = options.whole and (chosen == "final" or frozen)
     place = out or (rows.RESULTS if official else folder / "pages" / chosen)
-    pages = {"worlds": worlds_page.write, "mutilated": mutilated.write}
+    pages = {
+        "worlds": worlds_page.write,
+        "families": families_page.write,
+        "mutilated": mutilated.write,
+    }
     if chosen in pages:
         for path in pages[chosen](report.records, place, options.arguments):
             print(path)

@@ -42,7 +42,7 @@ CAMPAIGNS = {
     "short": hidden.campaign_short,
     "idle": hidden.campaign_idle,
 }
-SETS = {"small": 0, "tune": 1, "final": 2, "worlds": 3, "mutilated": 4}
+SETS = {"small": 0, "tune": 1, "final": 2, "worlds": 3, "mutilated": 4, "families": 5}
 LARGE, WEAK = (1.0, 5.0), (0.1, 1.0)  # ranges of sizes
 LOUDER = 3.0  # relative noise of the ``loud`` cases
 BRIEF = (30.0, 60.0, 120.0)  # durations of the ``brief`` recordings [s]

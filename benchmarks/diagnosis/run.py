@@ -15,7 +15,9 @@ import numpy as np
 
 from benchmarks.diagnosis import mutilated
 from benchmarks.diagnosis.cases import Case, cases
-from benchmarks.diagnosis.sources import HOME
+from benchmarks.diagnosis.families.cases import PLACES, parts_of
+from benchmarks.diagnosis.families.cases import cases as cases_of_families
+from benchmarks.diagnosis.sources import WORLDS
 from benchmarks.diagnosis.study import loops, needs_oracle, promised, study
 from benchmarks.diagnosis.worlds import draws
 from benchmarks.identity.hashing import digest
@@ -23,8 +25,10 @@ from benchmarks.runs import provenance
 from benchmarks.runs.runner import Computing
 from benchmarks.runs.store import Store, read_record
 from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.decide.rule import Rule
+from pam_envs.diagnosis.families.kinds import kind_named
 from pam_envs.diagnosis.fit.single_muscle import start_plant
 from sweeps import engine
 
@@ -40,10 +44,19 @@ Advance = Callable[[], None]
 @cache
 def engine_digest() -> str:
     """Return the digest of the numbers that determine a diagnosis: rule, causes, default plant."""
-    causes = [
-        (c.name, [[astuple(term) for term in form.terms] for form in c.forms]) for c in catalogue()
-    ]
-    return digest([asdict(Rule()), causes, start_plant(Rig()).digest()])
+    return digest([asdict(Rule()), _forms(catalogue()), start_plant(Rig()).digest()])
+
+
+@cache
+def family_digest(family: str) -> str:
+    """Return the digest of the numbers that only the diagnosis of a family depends on."""
+    kind = kind_named(family)
+    plant = kind.start(Rig(plant=family))
+    return digest([_forms(kind.causes(kind.catalogue)), plant.digest()])
+
+
+def _forms(causes: Iterable[Cause]) -> list[Any]:
+    return [(c.name, [[astuple(term) for term in form.terms] for form in c.forms]) for c in causes]
 
 
 @dataclass(frozen=True)
@@ -57,6 +70,8 @@ class Task:
     def key(self) -> str:
         """Digest of all inputs of the record; it is the record's file name."""
         parts = [self.case.record(), self.stage, engine_digest(), provenance.packages()]
+        if self.case.world in PLACES:
+            parts.append(family_digest(parts_of(self.case.world)[0]))
         return digest(parts)[:32]
 
 
@@ -130,10 +145,12 @@ def _drawn(options: Options) -> list[Case]:
     """Return the cases of a set."""
     if options.chosen == "worlds":
         return draws.cases(options.offset, options.each)
+    if options.chosen == "families":
+        return cases_of_families(options.offset, options.each)
     if options.chosen == "mutilated":
         return mutilated.cases(options.offset)
     if options.each:
-        raise ValueError("--each is for the set worlds; leave it out")
+        raise ValueError("--each is for the set worlds or families; leave it out")
     return cases(options.chosen, options.offset)
 
 
@@ -155,7 +172,7 @@ def run(
     further = {
         "loop": _looped(chosen, options),
         "next": [case for case in chosen if options.next and promised(made[case])],
-        "oracle": [case for case in chosen if case.world != HOME and needs_oracle(made[case])],
+        "oracle": [case for case in chosen if case.world in WORLDS and needs_oracle(made[case])],
     }
     for stage, some in further.items():
         for case, record in _stage(stage, some, store, options, report, start, act).items():
