@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from pam_envs.arrays import Array
 from pam_envs.diagnosis.cause import Cause, Form
 from pam_envs.diagnosis.fit import least_squares as lsq
 from pam_envs.diagnosis.fit.blocks import Blocks
+
+Name = TypeVar("Name")
 
 POLISH = 6  # largest number of rounds with the full Jacobian
 RACE = 6  # rounds after which only the best of several starts continues
@@ -77,7 +79,9 @@ def initial_fits(
     return fits
 
 
-def polish(problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH) -> None:
+def polish(
+    problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH, boxed: bool = False
+) -> None:
     """Improve fits in all their parameters, at first with the Jacobian of their base."""
     for fit in fits:
         if fit.shared is not None and len(fit.slopes):
@@ -85,7 +89,7 @@ def polish(problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH) 
         elif len(fit.slopes) != len(fit.frees):
             fit.take(fit.slopes[:0])
         fit.done, fit.damping, fit.shared = False, 1.0, None
-    lsq.improve(problem, fits, rounds, POLISHED_ENOUGH)
+    lsq.improve(problem, fits, rounds, POLISHED_ENOUGH, boxed=boxed)
 
 
 def complete_jacobian(problem: lsq.Problem, fit: lsq.Fit) -> None:
@@ -137,9 +141,9 @@ def refit(
     return Candidate(candidate.causes, fit, blocks.errors(problem.rows(fit.residual)))
 
 
-def best_by_name(fits: Iterable[tuple[str, lsq.Fit]]) -> dict[str, lsq.Fit]:
+def best_by_name(fits: Iterable[tuple[Name, lsq.Fit]]) -> dict[Name, lsq.Fit]:
     """Return the fit of the least cost for each name."""
-    best: dict[str, lsq.Fit] = {}
+    best: dict[Name, lsq.Fit] = {}
     for name, fit in fits:
         if name not in best or fit.cost < best[name].cost:
             best[name] = fit
