@@ -15,7 +15,7 @@ SCHEDULE = ((2, 8, 0.4), (2, 5, 0.6), (3, 4, 0.8))
 """Rounds with the base's Jacobian held; number of fits kept then, or their least share of the best
 gain."""
 FIRST_SIGHT = 0.3  # share of a required gain that the prediction of a search must reach
-POLISHED = 4  # number of the best rivals that are polished
+POLISHED = 4  # number of the best rivals that are polished, by cost and by gain
 CLOSE, CONVERGED = 0.5, 14
 """Share of the best gain from which a fit is continued, and the largest number of its rounds."""
 
@@ -50,7 +50,7 @@ def search(
         _drop(fits, base.fit.cost, kept, share_kept)
         if least > 0.0 and np.log(base.fit.cost / min(f.cost for f in fits)) < least:
             return []
-    ranked = _converged(problem, blocks, base, fits, polished)
+    ranked = converged(problem, blocks, base, fits, polished)
     found = [
         candidates.Candidate(
             (*base.causes, fit.label), fit, blocks.errors(problem.rows(fit.residual))
@@ -60,17 +60,17 @@ def search(
     return sorted(found, key=lambda c: -blocks.gain(base.errors, c.errors))
 
 
-def _converged(
+def converged(
     problem: lsq.Problem,
     blocks: Blocks,
     base: candidates.Candidate,
     fits: Sequence[lsq.Fit],
     polished: int,
 ) -> list[lsq.Fit]:
-    """Return the best fit of each cause, the leading causes in all their forms without shared slopes.
+    """Return the best fit of each cause, for the leading causes after convergence.
 
-    With slopes that hold only near the base's optimum another form of a cause may come to the least
-    cost than after convergence.
+    All forms of a leading cause are fitted with a Jacobian of their own: with slopes that hold only
+    near the base's optimum, another form of a cause may come first.
     """
 
     def gain(fit: lsq.Fit) -> float:
