@@ -1,11 +1,13 @@
 """Nominal elbow orthosis: signals, friction of the bundles, pressures for torque and stiffness.
 
 Friction inside the bundles depends on their contraction, and thus on the sensed angle. A nominal
-hysteresis of the angle gives the additional pull in one direction and the loss in the other.
+hysteresis model driven by the angle gives the increase of the force in one direction of motion and
+its decrease in the other.
 
-chakarov2018 finds the pressures by an optimisation. Torque and stiffness are linear in both
-pressures, so that two linear equations give them exactly. For references out of reach the torque
-has priority, and the stiffness is as near as possible (:mod:`pam_envs.mechanics`).
+chakarov2018 computes the pressures by an optimisation. Torque and stiffness are linear in both
+pressures, so that the solution of two linear equations gives the pressures exactly. For references
+out of reach the torque has priority, and the stiffness is as close to its reference as possible
+(:mod:`pam_envs.mechanics`).
 """
 
 from dataclasses import dataclass
@@ -30,7 +32,7 @@ NAMES = ["angle", "rate", "pressure_a", "pressure_b", "torque", "reference", "st
 
 
 class ElbowView(NamedTuple):
-    """One observation of every row in SI, arrays of shape (n_env,).
+    """One observation of every row in SI units, as arrays of shape (n_env,).
 
     The pressures of bundles a and b have the shape (2, n_env), the torque is estimated, and
     ``accepts`` marks the rows whose valves accept the next action.
@@ -49,7 +51,8 @@ class ElbowView(NamedTuple):
 class ElbowSignalMap:
     """Reader of observations as an :class:`ElbowView`, and writer of actions of both bundles.
 
-    ``to_pulse`` reads the time until on/off valves accept a pulse; the control period is in s.
+    ``to_pulse`` reads the time until on/off valves accept a pulse; ``period`` is the control period
+    [s].
     """
 
     reader: Reader
@@ -97,11 +100,11 @@ class ElbowFriction:
     plant: ElbowOrthosis
 
     def initial(self, rows: int) -> RowsState:
-        """Return the virgin states of a number of rows."""
+        """Return the virgin hysteresis states of a number of rows."""
         return self.plant.hysteresis.initial(rows)
 
     def losses(self, view: ElbowView, state: RowsState) -> tuple[Shares, RowsState]:
-        """Return the losses of both bundles' shapes [m^2], and the next hysteresis state."""
+        """Return the friction losses [m^2] of both bundles' shapes, and the next state."""
         return self.plant.slide(view.angle, view.pressure, state)
 
     def torque(self, view: ElbowView, losses: Shares) -> Array:
@@ -125,9 +128,9 @@ def pressures_for(
 ) -> tuple[Array, Array]:
     """Return the pressures [Pa] of bundles a and b of a nominal orthosis, shape (n_env,).
 
-    References and angle are in SI; ``friction`` is the loss of the bundles' shapes [m^2].
-    The limits are the lowest and highest pressures [Pa], shapes (2, n_env); default: the whole
-    range.
+    References and angle are in SI units; ``friction`` is the loss of the bundles' shapes [m^2]. The
+    limits are the lowest and highest pressures [Pa], shapes (2, n_env); by default they are those
+    of the whole range.
     """
     full = plant.full_pressure
     phi_a, phi_b, psi_a, psi_b = (np.ravel(x) for x in plant.geometry(angle))

@@ -1,19 +1,20 @@
 """Predictive allocation of the elbow: torque and stiffness one dead time ahead.
 
-The allocation of :mod:`baselines.elbow.allocation` finds the pressures for the present angle, which
-the bundles reach a dead time and a lag later, when the elbow is elsewhere. Here it is that for the
-time at which a setpoint takes effect:
+The allocation of :mod:`baselines.elbow.allocation` computes the pressures for the present angle.
+The bundles reach these pressures a dead time and a lag later, when the elbow has moved. Here torque
+and stiffness are allocated for the time at which a setpoint takes effect:
 
     angle       q + q' t + q'' t^2 / 2, from a Kalman filter of the sensed angle
-    references  Q + dQ/dq (q(t) - q), and the same of the stiffness
+    references  Q + dQ/dq (q(t) - q) for the torque, and likewise for the stiffness
     friction    that of the nominal bundles at the predicted angle
-    pressures   those that the regulators reach in one period, torque first
+    pressures   those that the regulators can reach in one period; the torque has priority
 
-The filter takes the acceleration as a random walk (barshalom2001). The references are functions of
-the sensed angle; their slopes are regressions over the last readings. The regulators are those of a
-bank, one for both bundles, chosen by the sensed pressures (:mod:`baselines.predictive.regulator`).
+The filter models the acceleration as a random walk (barshalom2001). The references are functions of
+the sensed angle; their slopes are estimated by regression over the latest readings. The model of
+the regulators is selected from a bank by the sensed pressures, one model for both bundles
+(:mod:`baselines.predictive.regulator`).
 
-On/off valves take a pulse only once in a cycle; with them the controller is
+On/off valves accept a pulse only once per cycle; for a plant with such valves the controller is
 ``elbow_allocation_early`` as designed.
 """
 
@@ -44,30 +45,30 @@ from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 ACCELERATION_STEP = 0.1
-"""Random step of the acceleration in a period [rad/s2]."""
+"""Random step of the acceleration per period [rad/s2]."""
 LEAST_NOISE = 1e-4
 """Smallest noise [rad] of the sensed angle for which the filter is designed."""
 MEMORY = 4.0
 """Time constant [periods] of the regression of the references on the angle."""
 LEAST_SPREAD = 1e-9
-"""Variance [rad2] of the angle that is added: without motion the slopes are 0."""
+"""Variance [rad2] added to that of the angle, so that the slopes are 0 without motion."""
 KNOBS: Bounds = {"lead": (0.25, 4.0), "agility": (0.05, 20.0), "memory": (0.25, 4.0)}
-"""Factors on the time ahead, on the random step of the acceleration, and on ``MEMORY``."""
+"""Factors on the prediction time, on the random step of the acceleration, and on ``MEMORY``."""
 
 
 class ElbowState(NamedTuple):
-    """State of the prediction, first axis n_env.
+    """State of the controller; the first axis is n_env.
 
     Attributes
     ----------
     bank, friction
-        States of the regulators, grouped by environment, and of the bundles.
+        State of the bank of regulators, grouped by environment, and of the bundles' friction.
     motion : ndarray, shape (n_env, 3)
         Angle [rad], rate [rad/s] and acceleration [rad/s2].
     mean : ndarray, shape (n_env, 3)
         Means of angle [rad], torque [N m] and stiffness [N m/rad] of the references.
     spread : ndarray, shape (n_env, 3)
-        Covariances [rad2, rad N m and N m] of the angle with the three.
+        Covariances [rad2, rad N m and N m] of the angle with these three quantities.
     """
 
     bank: BankState
@@ -84,7 +85,7 @@ class ElbowPredictive(RowController):
     Attributes
     ----------
     step : ndarray, shape (3, 3)
-        Motion [SI] over a period.
+        State transition matrix [SI] of the motion over a period.
     gains : ndarray, shape (3,)
         Gains [1, 1/s and 1/s2] of the filter.
     lead : float
@@ -135,7 +136,7 @@ class ElbowPredictive(RowController):
         return self.signals.write(command.reshape(-1, 2).T, observation), after
 
     def observed(self, view: ElbowView, state: ElbowState) -> ElbowState:
-        """Return the state with what an observation shows."""
+        """Return the state updated with an observation."""
         bank = self.bank.observe(state.bank.flat(), view.pressure.T.ravel())
         bank = self.bank.alike(bank, 2)
         expected = np.add.reduce(state.motion[:, None] * self.step, axis=2)
@@ -148,7 +149,7 @@ class ElbowPredictive(RowController):
         return ElbowState(bank, friction, motion, state.mean + self.share * off, spread)
 
     def _then(self, view: ElbowView, now: ElbowState, ahead: Array, pressure: Array) -> ElbowView:
-        """Return the view after ``ahead`` periods, (n_env,), at pressures [Pa] (2, n_env)."""
+        """Return the view predicted for ``ahead`` periods later, (n_env,), at pressures [Pa]."""
         time, (angle, rate, acceleration) = self.lead * ahead * self.bank.period, now.motion.T
         angle = angle + time * (rate + 0.5 * time * acceleration)
         angle = np.clip(angle, *self.friction.plant.angle_range)
@@ -162,7 +163,7 @@ class ElbowPredictive(RowController):
         )
 
     def _reached(self, pressure: Array, lag: Array, rate: Array) -> tuple[Array, Array]:
-        """Return the lowest and highest pressures [Pa] one period later, shapes (2, n_env)."""
+        """Return the lowest and highest pressures [Pa] reachable in a period, shapes (2, n_env)."""
         share, most = -np.expm1(-self.bank.period / lag), self.bank.period * rate
         full = self.friction.plant.full_pressure
         low = np.maximum((1.0 - share) * pressure, pressure - most)

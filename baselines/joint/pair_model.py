@@ -1,7 +1,8 @@
-"""Nominal muscles of joints over rows: pressures of a setpoint, torque and friction, linear motion.
+"""Nominal pairs of muscles: pressures of a setpoint, torque, friction, and linear motion.
 
-The friction is driven by the length of the muscles, and so by the angle, which is sensed: its state
-is known without a model of the motion. Geometry and force law are tabulated over the angle.
+All functions act on rows, one for each joint of each environment. The friction is driven by the
+length of the muscles, and hence by the angle, which is sensed, so that the state of the friction is
+known without a model of the motion. Geometry and force law are tabulated over the angle.
 """
 
 from dataclasses import dataclass
@@ -19,23 +20,24 @@ from pam_envs.mechanics.antagonistic_lever import SIDES
 from pam_envs.plants.antagonistic_joint.statics import PairPlant
 
 POINTS = 1201
-"""Angles, and setpoints, of the tables."""
+"""Number of angles, and of setpoints, in the tables."""
 BEYOND = 0.1
-"""Angle [rad] beyond the stop that the table covers."""
+"""Range [rad] beyond the stop that the table also covers."""
 RESOLUTION = 1.0
-"""Difference of pressures [Pa] that is not distinguished."""
+"""Deviation [Pa] below which two pressure differences count as equal."""
 STRAIN, LEVER, AREA, PASSIVE, STIFFNESS = 0, 2, 4, 6, 8
-"""Columns of the table, those of both muscles side by side: contraction beyond that of the straight
-joint [1], ``dL/dphi`` [m], force over pressure [m2], passive force [N]; stiffness [N m/rad]."""
+"""Columns of the table. Each of the first four is the first of two adjacent columns, one for each
+muscle: contraction relative to that of the straight joint [1], ``dL/dphi`` [m], force over pressure
+[m2], passive force [N]. The last is the stiffness [N m/rad] of the joint."""
 DRAG, LIMIT, LIMIT_RATE, VISCOSITY, DAMPING, LENGTH, FIRST, PER_ANGLE = range(8)
-"""Numbers of the model: friction over lag [N], slip limit without pressure [1] and its rise [1/Pa],
-viscosity over length [m s], damping [N m s/rad], rest length [m], first angle of the table [rad]
-and its cells per angle [1/rad]."""
+"""Indices of the numbers of the model: friction over lag [N], slip limit at zero pressure [1] and
+its slope over pressure [1/Pa], viscosity over length [m s], damping [N m s/rad], rest length [m],
+first angle of the table [rad] and number of table cells per angle [1/rad]."""
 
 
 @kernel
 def cell_at(table: Any, numbers: Any, angle: float) -> tuple[int, float]:
-    """Return the cell of an angle [rad], and the share of it below the angle."""
+    """Return the table cell of an angle [rad], and the position [0 to 1] of the angle in it."""
     place = min(max((angle - numbers[FIRST]) * numbers[PER_ANGLE], 0.0), len(table) - 1.001)
     cell = int(place)
     return cell, place - cell
@@ -43,7 +45,7 @@ def cell_at(table: Any, numbers: Any, angle: float) -> tuple[int, float]:
 
 @kernel
 def looked_up(table: Any, cell: int, share: float, column: int) -> float:
-    """Return a column at a share of a cell."""
+    """Return a column, interpolated at a position [0 to 1] in a cell."""
     low = table[cell][column]
     return low + share * (table[cell + 1][column] - low)  # type: ignore[no-any-return]
 
@@ -53,9 +55,10 @@ def friction_of(
     table: Any, numbers: Any, slip: Any, cell: int, share: float, side: int, pressure: float,
     sliders: Any,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the friction [N] of a muscle and the slope [N] of the part that sticks.
+    """Return the friction [N] of a muscle, and the slope [N] of the elements that stick.
 
-    The sliders, shape (elements,), move to the angle.
+    The slope is over the contraction [1]. The sliders, shape (elements,), are changed in place to
+    those at the angle.
     """
     thresholds, curves, low, per = slip
     limit = numbers[LIMIT] + numbers[LIMIT_RATE] * pressure
@@ -67,7 +70,7 @@ def friction_of(
 
 @kernel
 def force_of(table: Any, cell: int, share: float, side: int, pressure: float) -> float:
-    """Return the force [N] of the law, below 0 where the muscle is slack."""
+    """Return the force [N] of the static law, negative where the muscle is slack."""
     force = pressure * looked_up(table, cell, share, AREA + side)
     return force - looked_up(table, cell, share, PASSIVE + side)
 
@@ -79,7 +82,8 @@ def pull_rows(
 ) -> None:  # fmt: skip
     """Write torque [N m], stiffness [N m/rad] and damping [N m s/rad] of pairs, shape (3, rows).
 
-    The sliders, shape (rows, 2, elements), move to the angles [rad]; pressures [Pa], (rows, 2).
+    Angles [rad] have the shape (rows,), pressures [Pa] (rows, 2). The sliders, shape (rows, 2,
+    elements), are changed in place to those at the angles.
     """
     slip = (thresholds, curves, low, per)
     for r in range(len(angle)):
@@ -100,7 +104,10 @@ def friction_rows(
     table: Array, numbers: Array, thresholds: Array, curves: Array, low: float, per: float,
     angles: Array, pressures: Array, sliders: Array, torques: Array,
 ) -> None:  # fmt: skip
-    """Write the torques of friction [N m] at angles in turn, shape (rows, n); the sliders move."""
+    """Write the torques of friction [N m] at successive angles [rad], shape (rows, n).
+
+    The sliders, shape (rows, 2, elements), are changed in place to those at the last angle.
+    """
     slip = (thresholds, curves, low, per)
     for r in range(len(angles)):
         for k in range(angles.shape[1]):
@@ -116,7 +123,7 @@ def friction_rows(
 
 @kernel
 def share_of(value: float, least: float, most: float) -> float:
-    """Return the place of a value between two others, 0 below the first and 1 above the second."""
+    """Return the position of a value between two others: 0 below the first, 1 above the second."""
     if value <= least:
         return 0.0
     return (value - least) / (most - least) if value < most else 1.0
@@ -124,7 +131,7 @@ def share_of(value: float, least: float, most: float) -> float:
 
 @kernel
 def torque_under(table: Any, cell: int, share: float, both: Any, k: int) -> float:
-    """Return the torque [N m] without friction under setpoint ``k``."""
+    """Return the torque [N m] without friction at setpoint ``k``."""
     torque = 0.0
     for side in range(2):
         force = max(0.0, force_of(table, cell, share, side, both[side, k]))
@@ -137,7 +144,7 @@ def set_point_rows(
     table: Array, numbers: Array, set_points: Array, both: Array, angle: Array, torque: Array,
     found: Array,
 ) -> None:  # fmt: skip
-    """Write the setpoints [rad] under which the muscles exert torques [N m] at angles [rad]."""
+    """Write the setpoints [rad] at which the muscles exert torques [N m] at angles [rad]."""
     for r in range(len(angle)):
         cell, share = cell_at(table, numbers, angle[r])
         low, high = 0, len(set_points) - 1
@@ -156,7 +163,7 @@ def set_point_rows(
 
 @kernel
 def difference_after(both: Any, k: int, later: Any, lag: float, rate: float, time: float) -> float:
-    """Return the difference [Pa] of both pressures after a time [s] under setpoint ``k``."""
+    """Return the difference [Pa] between the two pressures a time [s] after setpoint ``k``."""
     a = regulated(later[0], both[0, k], lag, rate, time)
     return a - regulated(later[1], both[1, k], lag, rate, time)
 
@@ -166,10 +173,10 @@ def command_rows(
     angles: Array, both: Array, later: Array, wanted: Array, lag: Array, rate: Array, time: float,
     found: Array,
 ) -> None:  # fmt: skip
-    """Write the setpoints [rad] that lead to a difference [Pa] of both pressures after a time [s].
+    """Write the setpoints [rad] that lead to a pressure difference [Pa] after a time [s].
 
-    ``angles`` and ``both``, shapes (n,) and (2, n), are setpoints and their pressures [Pa],
-    ``later``, shape (rows, 2), the pressures when a setpoint takes effect.
+    ``angles`` [rad] and ``both`` [Pa], shapes (n,) and (2, n), are the tabulated setpoints and
+    their pressures; ``later`` [Pa], shape (rows, 2), are those when a setpoint takes effect.
     """
     for r in range(len(wanted)):
         low, high = 0, len(angles) - 1
@@ -202,7 +209,7 @@ class PairModel:
 
     @staticmethod
     def fits(plant: Any) -> bool:
-        """Return whether a plant has muscles, with friction driven by length or without any."""
+        """Return whether a plant has muscles, without or with friction driven by length."""
         if not isinstance(plant, PairPlant) or getattr(plant, "dynamics", "") != "muscles":
             return False
         return plant.hysteresis.operator is None or isinstance(plant.hysteresis.model, SlipModel)
@@ -221,15 +228,16 @@ class PairModel:
         return np.stack([np.interp(set_point, angles, one) for one in both], axis=-1)
 
     def difference(self, set_point: Array) -> Array:
-        """Return the difference [Pa] of both pressures at setpoints [rad]."""
+        """Return the difference [Pa] between the two pressures at setpoints [rad]."""
         angles, (a, b) = self._set_points
         return np.interp(set_point, angles, a - b)
 
     def command(self, later: Array, wanted: Array, lag: Array, rate: Array, period: float) -> Array:
-        """Return the setpoints [rad] that lead to a difference [Pa] of pressures, shape (rows,).
+        """Return the setpoints [rad] that lead to pressure differences [Pa], shape (rows,).
 
-        ``later``, shape (rows, 2), are the pressures [Pa] when a setpoint takes effect, a period
-        [s] before; lag [s] and rate [Pa/s] those of the regulators, shape (rows,).
+        The differences are those one period [s] after the setpoint takes effect; ``later``, shape
+        (rows, 2), are the pressures [Pa] at that instant. Lag [s] and rate [Pa/s] are those of the
+        regulators, shape (rows,).
         """
         found = np.empty_like(wanted)
         states = (np.ascontiguousarray(later), np.ascontiguousarray(wanted))
@@ -260,14 +268,17 @@ class PairModel:
 
     @cached_property
     def _slip(self) -> tuple[Array, Array, float, float]:
-        """Return thresholds, curves and grid of the friction elements, none without friction."""
+        """Return thresholds, curves and grid of the friction elements; empty without friction."""
         model = self.plant.hysteresis.model
         if isinstance(model, SlipModel):
             return model.arrays
         return np.zeros(0), np.zeros((0, 2)), 0.0, 1.0
 
     def initial(self, angle: Array, pressures: Array) -> Array:
-        """Return the sliders at angles [rad] after a virgin straight joint, (rows, 2, elements)."""
+        """Return the sliders after motion from the straight joint to angles [rad].
+
+        Their shape is (rows, 2, elements); at the straight joint they are in the virgin state.
+        """
         sliders = np.zeros((len(angle), 2, len(self._slip[0])))
         return self.friction(angle[:, None], pressures, sliders)[1]
 
@@ -279,16 +290,17 @@ class PairModel:
         return Pull(*found), after
 
     def friction(self, angles: Array, pressures: Array, sliders: Array) -> tuple[Array, Array]:
-        """Return the torques of friction [N m] at angles in turn, (rows, n), and the sliders."""
+        """Return the torques of friction [N m] at successive angles, (rows, n), and the sliders."""
         given, after = np.ascontiguousarray(angles), sliders.copy()
         torques = np.empty_like(given)
         friction_rows(*self._tables, given, np.ascontiguousarray(pressures), after, torques)
         return torques, after
 
     def set_point(self, angle: Array, torque: Array) -> Array:
-        """Return the setpoints [rad] under which the muscles exert torques [N m], any shape.
+        """Return the setpoints [rad] at which the muscles exert torques [N m] at angles [rad].
 
-        Without friction, at angles [rad]; out of reach the end of the range.
+        The arrays may have any shape. Friction is neglected. If a torque is out of reach, the
+        setpoint is the end of its range.
         """
         found = np.empty(angle.size)
         given = (np.ascontiguousarray(angle).ravel(), np.ascontiguousarray(torque).ravel())
@@ -313,14 +325,15 @@ class PairModel:
 
 @dataclass(frozen=True)
 class LinearMotion:
-    """Linear motion of n coupled joints about the straight ones over a control period.
+    """Linear motion of n coupled joints about the straight pose over a control period.
 
         M q'' + D q' + K q = torque
 
     Attributes
     ----------
     a, b : ndarray, shapes (2 n, 2 n) and (2 n, n)
-        From angles [rad], rates [rad/s] and a torque [N m] that is held, to the next ones.
+        Matrices that map angles [rad] and rates [rad/s], and a constant torque [N m], to the angles
+        and rates one period later.
     """
 
     a: Array
@@ -337,10 +350,11 @@ class LinearMotion:
         return cls(moved[: 2 * n, : 2 * n], moved[: 2 * n, 2 * n :])
 
     def observer(self, noise: float, rate_step: float, torque_step: float) -> Array:
-        """Return the steady Kalman gains of angles, rates and disturbance torques, (3 n, n).
+        """Return the steady-state Kalman gains of angles, rates and disturbances, (3 n, n).
 
-        Noise of the sensed angles [rad], and random steps of rates [rad/s] and of the disturbance
-        [N m] in a period: the disturbance model of pannocchia2003, which leaves no static error.
+        They are designed for the noise [rad] of the sensed angles, and for random steps per period
+        of rates [rad/s] and disturbance torques [N m]. With this disturbance model, that of
+        pannocchia2003, no static error remains.
         """
         n = self.b.shape[1]
         a = np.block([[self.a, self.b], [np.zeros((n, 2 * n)), np.eye(n)]])
@@ -353,7 +367,7 @@ class LinearMotion:
     def regulator(self, weight: float) -> Array:
         """Return the gains [N m/rad, N m s/rad] of a linear-quadratic regulator, shape (n, 2 n).
 
-        ``weight`` [N m/rad] is that of an error of angle over that of a torque.
+        An angle error costs as much as a torque of ``weight`` [N m/rad] times that error.
         """
         n = self.b.shape[1]
         errors = np.diag(np.repeat([weight**2, 0.0], n))
@@ -363,4 +377,5 @@ class LinearMotion:
 
 
 ANGLE_STEP = 1e-3
-"""Random step of an angle in a period over the sensor's noise: angles move by their rates."""
+"""Random step of an angle per period, divided by the sensor noise; small, because angles change
+only by their rates."""

@@ -1,33 +1,34 @@
-"""Predictive inverse of joints with a torque observer.
+"""Predictive inverse of joints with an observer of the disturbance torque.
 
     preview -> torques along the reference -> setpoints that exert them there
     -> best rate-limited path -> setpoint, one dead time ahead
 
-This is model predictive control of the nominal joint or arm, solved by its structure, as for the
-single muscle (:mod:`baselines.positioning.predictive`). Friction is driven by the length of the
-muscles, that is, by the angle: along a previewed reference it is known in advance,
+This is model predictive control of the nominal joint or arm, solved by exploiting its structure, as
+for the single muscle (:mod:`baselines.positioning.predictive`). Friction is driven by the length of
+the muscles, and hence by the angle, so that it is known in advance along a previewed reference
+``r``. To follow the reference the muscles have to exert
 
     torque = M r'' + D r' + weight(r) - friction(r) - d + P e + Q e'
 
-with the torque ``friction`` of the friction on the joint, the disturbance ``d``, and the error ``e
-= r - q`` that is predicted for the time at which a setpoint takes effect. ``M`` is the mass matrix
-of the straight joints; it couples the joints of an arm. The muscles exert the torque at the angle
-``r`` under a setpoint of the static law. The difference of both pressures, which changes by at most
-twice the rate limit, follows the best path through those setpoints
-(:mod:`baselines.predictive.rate_limited`).
+where ``friction`` is the torque of the friction on the joint, ``d`` the disturbance torque, and
+``e = r - q`` the error predicted for the time at which a setpoint takes effect. ``M`` is the mass
+matrix of the straight joints; in an arm it couples the joints. The static law gives the setpoints
+at which the muscles exert this torque at the angle ``r``. The difference between the two pressures
+of a joint, which changes by at most twice the rate limit, follows the best rate-limited path
+towards the differences of those setpoints (:mod:`baselines.predictive.rate_limited`).
 
-The motion of the nominal joint under the estimated pressures is compared with the sensed angle. A
-Kalman filter corrects angle, rate and ``d`` (pannocchia2003): an undeclared payload, a wrong force
-law and a wrong friction are torques. ``P`` and ``Q`` are those of a linear-quadratic regulator of
-the linear motion (anderson2007). With an exact model and ideal sensors ``d`` and ``e`` are zero.
-The regulators of the pressures are those of a bank (:mod:`baselines.predictive.regulator`), one for
-all muscles, chosen by the sensed pressures.
+A Kalman filter compares the sensed angle with the motion of the nominal joint under the estimated
+pressures, and corrects angle, rate and ``d`` (pannocchia2003): an undeclared payload, a wrong force
+law and wrong friction act as such a torque. ``P`` and ``Q`` are the gains of a linear-quadratic
+regulator for the linear motion (anderson2007). With an exact model and ideal sensors ``d`` and
+``e`` are zero. The model of the pressure regulators is selected from a bank
+(:mod:`baselines.predictive.regulator`) by the sensed pressures, one model for all muscles.
 
-In an arm, a joint whose setpoint is at the end of its range cannot reach its reference; the others
-compensate the error of the tool, by damped least squares (nakamura1986).
+In an arm, a joint whose setpoint is at the end of its range cannot reach its reference; the other
+joints compensate for the error of the tool by damped least squares (nakamura1986).
 
-A plant without muscles, or with friction driven by pressure, whose inverse is that of the setpoint,
-has the model-following controller (``joint_mfc_mu_ahead``) as designed.
+For a plant without muscles, or with friction driven by pressure, whose inverse acts on the
+setpoint, the controller is the model-following one (``joint_mfc_mu_ahead``) as designed.
 """
 
 import math
@@ -57,50 +58,51 @@ from baselines.predictive.regulator import BankState, RegulatorBank
 from pam_envs.arrays import Array
 
 BLOCKS = np.array((1.0,) * 10 + (2.0,) * 6 + (4.0,) * 8)
-"""Control periods between the nodes of the horizon: 0.54 s."""
+"""Control periods between the nodes of the horizon, 0.54 s in total."""
 ENDS = np.cumsum(BLOCKS)
-"""Nodes of the horizon [periods] from when a setpoint takes effect."""
+"""Nodes of the horizon [periods], counted from the time at which a setpoint takes effect."""
 APART = 3.0
-"""Distance [periods] of the samples whose differences are the reference's rate and acceleration."""
+"""Spacing [periods] of the samples whose differences give rate and acceleration of a reference."""
 LEAD = 0.5
 """Share of the damping of muscles and link that is compensated by a lead of the reference; the rest
-is compensated by its rate."""
+is compensated by a torque proportional to the rate of the reference."""
 LEAST_NOISE = 1e-4
 """Smallest noise [rad] of the sensed angle for which the observer is designed."""
 RATE_STEP, TORQUE_STEP = 0.02, 0.01
-"""Random steps in a period of the rate [rad/s] and of the disturbance [N m]."""
+"""Random steps per period of the rate [rad/s] and of the disturbance torque [N m]."""
 LARGEST_ERROR, LARGEST_RATE_ERROR = 0.05, 0.5
-"""Largest errors of angle [rad] and rate [rad/s] that are fed back."""
+"""Limits of the errors of angle [rad] and rate [rad/s] that are fed back."""
 END_TOLERANCE = 1e-4
-"""Distance [rad] of a setpoint from the end of its range that counts as at the end."""
+"""Distance [rad] from the end of its range within which a setpoint counts as at the end."""
 SMALLEST_SHORTFALL, LARGEST_SHIFT = 5e-4, 0.1
-"""Shortfall [rad] of a joint beyond which the others compensate it; largest compensation [rad]."""
+"""Shortfall [rad] of a joint above which the other joints compensate for it, and largest
+compensation [rad]."""
 SETTLING = 10.0
-"""Time constant [periods] of the shortfalls."""
+"""Time constant [periods] of the filter of the shortfalls."""
 TOOL = 0.1
-"""Length [m] that makes errors of the tool's direction and position comparable."""
+"""Length [m] by which an error of the tool's direction is weighted against one of its position."""
 COMPENSATION_DAMPING = 0.02
 """Damping of the least squares [m/rad]."""
 GRADIENT = 1e-4
-"""Angle [rad] for the stiffness of the weight."""
-KNOBS: Bounds = {"lead": (0.1, 4.0), "observer": (0.1, 10.0), "feedback": (0.1, 6.0)}
-"""Factors on the lead, on the observer's noise of rate and disturbance, and on the regulator's
-weight of a deviation."""
+"""Step of the angle [rad] with which the stiffness due to the weight is computed."""
+KNOBS: Bounds = {"lead": (0.1, 4.0), "observer": (0.03, 10.0), "feedback": (0.1, 6.0)}
+"""Factors on the lead, on the random steps for which the observer is designed, and on the weight of
+an angle error in the linear-quadratic regulator."""
 
 
 class PredictiveState(NamedTuple):
-    """State of the model, first axis n_env, and then n_joints.
+    """State of the controller; the first axis is n_env, the second n_joints.
 
     Attributes
     ----------
     bank, seen
-        States of the regulators, grouped by environment, and of the preview.
+        State of the bank of regulators, grouped by environment, and stored preview.
     pressure : ndarray, shape (n_env, n_joints, 2)
         Estimated pressures [Pa] of the muscles.
     sliders : ndarray, shape (n_env, n_joints, 2, elements)
-        Positions [1] of the friction's sliders.
+        Positions [1] of the sliders of the friction elements.
     angle, rate, disturbance : ndarray, shape (n_env, n_joints)
-        Estimates [rad], [rad/s], [N m].
+        Estimated angle [rad], rate [rad/s] and disturbance torque [N m].
     shortfall : ndarray, shape (n_env, n_joints)
         Angles [rad] by which joints at the end of their range miss the reference.
     """
@@ -116,10 +118,11 @@ class PredictiveState(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """Reference at the nodes of the horizon, (n_env, n_joints, n_nodes), and what is to be exerted.
+    """Reference at the nodes of the horizon, (n_env, n_joints, n_nodes), and feedback torque.
 
-    ``led`` is the angle [rad] a lead later, and so are rate [rad/s] and acceleration [rad/s2].
-    ``feedback``, shape (n_env, n_joints), is a torque [N m] that is added.
+    ``angle`` [rad] is the reference at the nodes. ``led`` [rad] is the reference one lead later, at
+    which ``rate`` [rad/s] and ``acceleration`` [rad/s2] are taken as well. ``feedback`` [N m],
+    shape (n_env, n_joints), is added to the torque.
     """
 
     angle: Array
@@ -131,7 +134,7 @@ class Demand(NamedTuple):
 
 @dataclass(frozen=True)
 class StraightMotion:
-    """Motion of the straight joints with a payload, and the gains that are designed for it.
+    """Motion of the straight joints with a payload, and the gains designed for it.
 
     ``observer`` and ``feedback`` are factors; see ``KNOBS``.
     """
@@ -143,7 +146,7 @@ class StraightMotion:
 
     @cached_property
     def damping(self) -> Array:
-        """Damping [N m s/rad] beside that of the muscles and of their link, (n_joints,)."""
+        """Damping [N m s/rad] in addition to that of the muscles and their link, (n_joints,)."""
         plant = self.plant
         if plant.stages == 1:
             return np.zeros(1)
@@ -151,12 +154,12 @@ class StraightMotion:
 
     @cached_property
     def mass(self) -> Callable[[float], Array]:
-        """From a payload [kg] to the mass matrix [kg m2], cached."""
+        """Function from a payload [kg] to the mass matrix [kg m2], cached."""
         return cache(self._mass)
 
     @cached_property
     def gains(self) -> Callable[[float], tuple[Array, Array]]:
-        """From a payload [kg] to the gains of observer and regulator, cached.
+        """Function from a payload [kg] to the gains of observer and regulator, cached.
 
         Their shapes are (3 n_joints, n_joints) and (n_joints, 2 n_joints)
         (:class:`~baselines.joint.pair_model.LinearMotion`).
@@ -190,7 +193,7 @@ class JointPredictive(RowController):
     Attributes
     ----------
     pressures : Reader
-        Reader of the sensed pressures, those of a joint side by side.
+        Reader of the sensed pressures; those of the two muscles of a joint are adjacent.
     lead : float
         Lead of the reference [s].
     """
@@ -233,7 +236,7 @@ class JointPredictive(RowController):
     def observed(
         self, observation: ArrayLike, view: JointView, state: PredictiveState
     ) -> PredictiveState:
-        """Return the state with what an observation shows of reference and plant."""
+        """Return the state updated with an observation of reference and plant."""
         sensed = self.pressures.rows(observation).T
         bank = self.bank.alike(
             self.bank.observe(state.bank.flat(), sensed.ravel()), sensed.shape[1]
@@ -260,10 +263,10 @@ class JointPredictive(RowController):
     def _moved(
         self, view: JointView, state: PredictiveState, stages: Array, times: Array
     ) -> PredictiveState:
-        """Return the state after stages at whose ends the muscles have new pressures [Pa].
+        """Return the state after stages, at the end of each of which the pressures [Pa] are given.
 
         ``stages`` has the shape (n_stages, n_env, n_joints, 2), ``times`` [periods] (n_stages,
-        n_env). The middle of a stage is implicit: stable for every stiffness.
+        n_env). The midpoint rule is linearly implicit and therefore stable for every stiffness.
         """
         angle, rate, was, sliders = state.angle, state.rate, state.pressure, _flat(state.sliders)
         mass, unit = self._masses(view.payload), np.eye(angle.shape[1])
@@ -333,9 +336,10 @@ class JointPredictive(RowController):
         delay: Array,
         shift: Array,
     ) -> Demand:
-        """Return the demand after a delay [periods], (n_env,), when the joints are at ``then``.
+        """Return the demand on setpoints that take effect after a delay [periods], shape (n_env,).
 
-        ``shift``, shape (n_env, n_joints), is added to the reference [rad].
+        ``then`` is the predicted state at that time. ``shift``, shape (n_env, n_joints), is added
+        to the reference [rad].
         """
         period = self.bank.period
         start = (now.seen.step + delay)[:, None]
@@ -360,7 +364,7 @@ class JointPredictive(RowController):
         )
 
     def _levels(self, view: JointView, then: PredictiveState, demand: Demand) -> Array:
-        """Return the setpoints [rad] that exert the torques of a demand at its nodes."""
+        """Return the setpoints [rad] at which the muscles exert the torques of a demand."""
         shape, model = demand.angle.shape, self.model
         flat = demand.angle.reshape(-1, shape[2])
         rubs, _ = model.friction(flat, then.pressure.reshape(-1, 2), _flat(then.sliders))
@@ -378,7 +382,7 @@ class JointPredictive(RowController):
         return demand.led - bend + static
 
     def _shortfall(self, view: JointView, now: PredictiveState) -> Array:
-        """Return the filtered angles [rad] by which joints at the end of their range are short."""
+        """Return the filtered angles [rad] by which joints at the end of their range fall short."""
         low, high = self.model.plant.angle_range
         off = np.clip(now.angle - view.reference, -LARGEST_SHIFT, LARGEST_SHIFT)
         ends = np.abs(view.set_point - np.where(view.set_point > 0.0, high, low)) <= END_TOLERANCE
@@ -386,7 +390,7 @@ class JointPredictive(RowController):
         return np.asarray(now.shortfall + (short - now.shortfall) / SETTLING)
 
     def _compensation(self, view: JointView, shortfall: Array) -> Array:
-        """Return the shifts of the references [rad] that keep the tool where it should be."""
+        """Return the shifts of the references [rad] that compensate for the error of the tool."""
         chain = getattr(self.model.plant, "chain", None)
         size = np.maximum(np.abs(shortfall) - SMALLEST_SHORTFALL, 0.0)
         if chain is None or not size.any():
@@ -407,7 +411,7 @@ def _flat(sliders: Array) -> Array:
 
 
 def _product(matrix: Array, rows: Array) -> Array:
-    """Return ``matrix @ row`` for every row, in an order that depends on no other row.
+    """Return ``matrix @ row`` for every row, summed in an order independent of the other rows.
 
     ``matrix`` has the shape (n_env, m, n), ``rows`` (n_env, n).
     """
@@ -415,7 +419,7 @@ def _product(matrix: Array, rows: Array) -> Array:
 
 
 def _solved(left: Array, right: Array) -> Array:
-    """Return the solutions of a system for each row."""
+    """Return the solution of the linear system of each row."""
     return np.asarray(np.linalg.solve(left, right[..., None])[..., 0])
 
 

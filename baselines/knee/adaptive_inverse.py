@@ -19,7 +19,6 @@ the sensed angle.
 
 In a gait the regulator is at rest until the first stance, so that nothing shows its rate limit. A
 small probe in a first swing, where the tension is not tracked, lets the bank of regulators choose.
-Beyond the preview the tension of an unknown stride goes on with the last trend, the angle does not.
 """
 
 import math
@@ -30,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Prediction, RowController, Rows
+from baselines.core.controller import Prediction, RowController
 from baselines.core.entry import Bounds, Spec
 from baselines.knee.anticipation import (
     ANTICIPATION,
@@ -38,7 +37,6 @@ from baselines.knee.anticipation import (
     KneeAnticipation,
     make_knee_anticipation,
 )
-from baselines.knee.plan import Plan
 from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -59,14 +57,11 @@ PRESSURE = 0.5e5
 """Height [Pa] of the probe: most regulators reach their rate limit."""
 PROBE, PROBED = (5, 20), 6
 """Begin and end [periods] of the probe, and the nodes of the horizon that it moves."""
-TREND = 45.0
-"""Time constant [periods] with which the trend of an unknown stride fades."""
 GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
 """Limits of ``a`` and of the width ``b / a``; a wider loop would have no increasing inverse."""
 KNOBS: Bounds = {
     "observer": (0.2, 5.0),
     "memory": (0.2, 5.0),
-    "trend": (0.05, 5.0),
     "probe": (0.01, 20.0),
 }
 
@@ -85,8 +80,8 @@ class AdaptiveState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TrendAnticipation(KneeAnticipation):
-    """Anticipating inverse with a bending brace, or with the trend of an unknown stride.
+class BendingAnticipation(KneeAnticipation):
+    """Anticipating inverse with a bending brace.
 
     The offset of a brace whose tension is controlled is that of its angle from the plan [rad].
 
@@ -96,13 +91,10 @@ class TrendAnticipation(KneeAnticipation):
         Delay with which the brace bends [control periods].
     share : float
         Share of a difference that enters the offset in a period.
-    fading : float
-        Time constant with which the last trend of a gait's tension fades [control periods].
     """
 
     bending: float
     share: float
-    fading: float
 
     def observed(self, observation: ArrayLike, state: AnticipationState) -> AnticipationState:
         """Return the state with what an observation shows of plan, brace and plant."""
@@ -123,19 +115,6 @@ class TrendAnticipation(KneeAnticipation):
         """Return the planned angles [rad] of the bending brace, shape (n_env, n_times)."""
         times = np.maximum(ends - self.bending, -self.phase.present(now.plan)[:, None])
         return self.observer.nominal.angle_of(self.phase.read(now.plan, times)[0][:, 0])
-
-    def _ahead(self, plan: Plan, ends: Array) -> tuple[Array, Rows]:
-        samples, known = self.phase.read(plan, ends)
-        ahead = self.phase.memory.ahead
-        if not self.observer.gait or len(ahead) < 2:
-            return samples, known
-        last = (plan.seen.step + ahead[-1])[:, None].astype(float)
-        near, _ = self.phase.memory.read(plan.seen, last + np.array([ahead[-2] - ahead[-1], 0.0]))
-        slope = (near[:, 0, 1] - near[:, 0, 0]) / (ahead[-1] - ahead[-2])
-        beyond = np.maximum(self.phase.present(plan)[:, None] + ends - last, 0.0)
-        more = slope[:, None] * self.fading * -np.expm1(-beyond / self.fading)
-        samples[:, 0] = np.where(known, samples[:, 0], np.maximum(samples[:, 0] + more, 0.0))
-        return samples, known
 
 
 @dataclass(frozen=True)
@@ -227,8 +206,7 @@ def make_knee_adaptive_inverse(spec: Spec[KneeOrthosis]) -> KneeAdaptiveInverse:
     made = make_knee_anticipation(spec, adaptive=True)
     bending = lever.damping / lever.stiffness / period if spec.plant.mounting == "no_load" else 0.0
     share = -math.expm1(-period / (spec.knob("observer") * OBSERVER))
-    fading = spec.knob("trend") * TREND
-    forward = TrendAnticipation(**vars(made), bending=bending, share=share, fading=fading)
+    forward = BendingAnticipation(**vars(made), bending=bending, share=share)
     forgetting = math.exp(-period / (spec.knob("memory") * MEMORY))
     return KneeAdaptiveInverse(forward, share, forgetting, spec.knob("probe") * PRESSURE)
 

@@ -14,14 +14,19 @@ tracked. Heel contact and toe-off are those of the plan, shifted by the wearer's
 A planned sample is in stance where it differs from the tension of zero torque at the planned angle.
 In swing both are equal but for a constant offset, which is observed there.
 
+The torque of a gait's plan is that of the wearer but for a difference, which is sensed and fades.
+The tension that gives it depends on the angle, which is the plan's, moved by the deviation of the
+wearer's knee under the assistance (:mod:`baselines.knee.wearer`) and by a filtered difference.
+
 With feedback, a PI compares the sensed tension with that of the nominal muscle under the same
 commands at the sensed angle, one dead time late. With an exact model it is at rest: it starts at
 zero and does not counteract the anticipation.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -39,9 +44,11 @@ from baselines.core.controller import (
 from baselines.core.entry import KNEE, Entry, Spec
 from baselines.knee.nominal import KneeObserver, KneeView, make_knee_observer
 from baselines.knee.plan import SCALES, PhaseFilter, Plan
+from baselines.knee.stride import NominalStride
+from baselines.knee.wearer import WearerModel
 from baselines.predictive.preview import PreviewMemory
 from baselines.predictive.rate_limited import best_path
-from baselines.predictive.regulator import BankState, RegulatorBank
+from baselines.predictive.regulator import Arrival, BankState, RegulatorBank
 from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
 from pam_envs.parameters import Signal
@@ -50,7 +57,7 @@ from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 SWING = 0.001
 """Weight of a squared tension error in swing, which is not tracked, relative to stance."""
 UNKNOWN = 0.3
-"""Weight of samples that are neither previewed nor remembered."""
+"""Weight of samples of an aperiodic reference beyond its preview."""
 BLOCKS = (1,) * 8 + (2,) * 6 + (4,) * 10
 """Control periods between the nodes of the horizon: 0.6 s."""
 ANGLE_NOISE = 0.01
@@ -60,7 +67,13 @@ TORQUE_NOISE = 0.4
 USUAL_STRETCH = 0.05
 """Stretch [m] whose errors of the tension have the weight 1."""
 KEPT = 300.0
-"""Time constant [periods] for which the reference keeps its distance from the plan."""
+"""Time constant [periods] for which the torque keeps its distance from the plan."""
+FILTERED = 0.7
+"""Share of a difference of the angle that is attributed to the path in a period."""
+YIELDING = np.array([0.001, 0.03])
+"""Weights [rad2] of the nominal deviation in swing and in stance, against those that are sensed."""
+CONTACT = 0.5
+"""Load on the leg at heel contact [1]."""
 MISMATCH = 0.1
 """Likelihood that the plan is in stance and the wearer not, or the reverse, at the right shift."""
 SPREAD = 0.5**0.5
@@ -86,7 +99,12 @@ class AnticipationState(NamedTuple):
     """States of regulator, hysteresis and plan, offset of the reference in swing [N], and moments.
 
     ``moments``, shape (n_env, 2), are the sums of squares of the nominal tension, and of its
-    product with the sensed one [N2].
+    product with the sensed one [N2]. ``wearer``, shape (n_env, 3), are the deviation of the knee
+    [rad], its rate [rad/s], and the difference of the path from the plan [rad]. ``yielding``, shape
+    (n_env, 2, 2), in swing and in stance, are the sums of squares of the deviation, and of its
+    product with the sensed one [rad2]. ``torque``, shape (n_env, n_nodes), are the torques of the
+    brace [N m] that were planned in the last period, and ``place``, shape (n_env,), is the present
+    in the nominal stride [control periods].
     """
 
     bank: BankState
@@ -94,6 +112,10 @@ class AnticipationState(NamedTuple):
     plan: Plan
     offset: Array
     moments: Array
+    wearer: Array
+    yielding: Array
+    torque: Array
+    place: Array
 
 
 @dataclass(frozen=True)
@@ -109,11 +131,13 @@ class KneeAnticipation(RowController):
     channels : tuple of Reader
         Readers of the previewed reference, and of the previewed angle with a gait.
     torque : Reader, optional
-        Reader of the torque reference of a gait.
+        Reader of the torque reference of a gait, and of the ground force.
     pressure : Reader
         Reader of the sensed pressure.
     bank : RegulatorBank
         Candidates of the regulator, or the nominal one.
+    stride : NominalStride, optional
+        Nominal stride of a gait.
     adaptive : bool
         Whether regulator and gain are estimated.
     """
@@ -124,6 +148,7 @@ class KneeAnticipation(RowController):
     torque: Reader | None
     pressure: Reader
     bank: RegulatorBank
+    stride: NominalStride | None
     adaptive: bool
     action_signal: Signal
 
@@ -136,6 +161,10 @@ class KneeAnticipation(RowController):
             plan,
             np.zeros_like(view.set_point),
             np.full((len(view.set_point), 2), USUAL),
+            np.zeros((len(view.set_point), 3)),
+            np.tile(YIELDING[:, None], (len(view.set_point), 1, 2)),
+            np.zeros((len(view.set_point), len(ENDS))),
+            np.zeros(len(view.set_point)),
         )
 
     def respond(self, observation: ArrayLike, state: AnticipationState) -> Prediction:
@@ -158,14 +187,20 @@ class KneeAnticipation(RowController):
         arrival = self.bank.arrival(now.bank)
         later = self.observer.nominal.along(arrival.pressures, now.hysteresis)
         ends = arrival.delay[:, None] + ENDS
-        stiffness, weight = self._demands(view, now, ends, more)
+        angle = self._angles_ahead(view, observation, now, arrival, ends)
+        stiffness, weight = self._demands(view, observation, now, ends, angle, more)
         path = (inverse or partial(self._inverse, now.moments))(stiffness, later)
         reach = (arrival.rate * self.bank.period)[:, None] * np.array(BLOCKS, float)
         start = arrival.pressures[-1]
-        following = best_path(start, path, weight, reach)[:, 0]
-        command = arrival.set_point(following, self.bank.period)
+        best = best_path(start, path, weight, reach)
+        command = arrival.set_point(best[:, 0], self.bank.period)
         command = np.minimum(np.maximum(command, signal.low), signal.high)
         after = now._replace(bank=self.bank.advance(now.bank, command))
+        if self.observer.gait:
+            reached = stiffness + (best - path) / self.observer.nominal.per_stiffness
+            tension = np.maximum(reached, 0.0) * self.observer.nominal.stretch(angle)
+            torque = self.observer.nominal.plant.lever.torque(tension, angle)
+            after = after._replace(torque=torque)
         return encode_action(signal, command, observation), after
 
     def _inverse(self, moments: Array, stiffness: Array, later: RowsState) -> Array:
@@ -197,14 +232,87 @@ class KneeAnticipation(RowController):
             moments = (1.0 - 1.0 / MEMORY) * moments + products
             moments = np.clip(moments, moments[:, :1] / 2.0, moments[:, :1] * 2.0)
         plan = self.phase.add(state.plan, self._samples(observation))
-        now = AnticipationState(bank, hysteresis, plan, state.offset, moments)
+        place = self._place(plan, state.place + 1.0)
+        now = state._replace(
+            bank=bank, hysteresis=hysteresis, plan=plan, moments=moments, place=place
+        )
         if not self.observer.gait:
             return now
         plan = self.phase.follow(plan, partial(self._likelihood, view, observation, now))
+        now = self._pushed(view, observation, now._replace(plan=plan))
         free = nominal.free_tension(view.angle)
         swing = ~view.stance & (free > SMALLEST)
         offset = np.where(swing, view.reference - free, state.offset)
-        return now._replace(plan=plan, offset=offset)
+        return now._replace(offset=offset)
+
+    @cached_property
+    def _leg(self) -> WearerModel:
+        return WearerModel(self.observer.nominal.plant)
+
+    def _pushed(
+        self, view: KneeView, observation: ArrayLike, now: AnticipationState
+    ) -> AnticipationState:
+        """Return the state with the wearer's deviation under the sensed tension.
+
+        In swing the wearer's path is given, so that his deviation is sensed.
+        """
+        assert self.torque is not None
+        lever, ground = self.observer.nominal.plant.lever, self.torque.rows(observation)[1]
+        path = self.phase.read(now.plan, np.tile([-1.0, 0.0, 1.0], (len(view.angle), 1)))[0][:, 1]
+        torque = lever.torque(view.tension, view.angle)[:, None] + self._leg.passive(path)
+        load = self._leg.load(ground)[:, None]
+        off, rate = self._leg.along(now.wearer[:, :2], torque, load)[:, 1].T
+        sensed = view.angle - np.where(view.stance, path[:, 1], view.angle_reference)
+        phase = np.stack([~view.stance, view.stance], axis=1)
+        products = np.stack([off, sensed], axis=1) * off[:, None]
+        yielding = now.yielding + np.where(phase[..., None], products[:, None], 0.0)
+        yielding[..., 1] = np.clip(yielding[..., 1], 0.5 * yielding[..., 0], 2.0 * yielding[..., 0])
+        ratio = yielding[..., 1] / yielding[..., 0]
+        scaled = np.where(view.stance, ratio[:, 1], ratio[:, 0]) * off
+        differs = view.angle - path[:, 1] - scaled
+        differs = now.wearer[:, 2] + FILTERED * (differs - now.wearer[:, 2])
+        return now._replace(wearer=np.stack([off, rate, differs], axis=1), yielding=yielding)
+
+    def _angles_ahead(
+        self, view: KneeView, observation: ArrayLike, now: AnticipationState, arrival: Arrival,
+        ends: Array,
+    ) -> Array:  # fmt: skip
+        """Return the predicted angles [rad] at the nodes of a gait, (n_env, n_nodes).
+
+        Until a setpoint of now takes effect the torque is that of the nominal muscle under the
+        pressures to come; afterwards that of the path planned in the last period.
+        """
+        if self.torque is None:
+            return np.zeros_like(ends)
+        nominal, n = self.observer.nominal, len(ends)
+        lever, last = nominal.plant.lever, math.ceil(ends.max()) + 1
+        times = np.arange(-1.0, last + 2.0)
+        samples, _ = self._ahead(now, np.tile(times, (n, 1)))
+        here = now.wearer[:, [0, 2]].sum(axis=1)[:, None]
+        path, stance = samples[:, 1], self._in_stance(samples[:, 0], samples[:, 1], now)
+        halves = np.arange(last) + 0.5
+        torque = np.stack([np.interp(halves, ends[i] - 1.0, now.torque[i]) for i in range(n)])
+        middle = 0.5 * (path[:, 1:-2] + path[:, 2:-1]) + here
+        hysteresis, gain = now.hysteresis, now.moments[:, 1] / now.moments[:, 0]
+        for k, pressure in enumerate(arrival.pressures):
+            stiffness = np.maximum(nominal.stiffness_after(pressure, hysteresis), 0.0)
+            hysteresis = nominal.advance(pressure, hysteresis)
+            tension = gain * stiffness * nominal.stretch(middle[:, k])
+            given = lever.torque(tension, middle[:, k])
+            torque[:, k] = np.where(k < arrival.delay, given, torque[:, k])
+        torque = torque + self._leg.passive(path)[:, :last]
+        sensed = self._leg.load(self.torque.rows(observation)[1])[:, None]
+        begins = stance[:, 2:-1] & ~view.stance[:, None]
+        load = np.where(begins, CONTACT, sensed)
+        course = self._leg.along(now.wearer[:, :2], torque, load)[..., 0]
+        ratio = now.yielding[..., 1] / now.yielding[..., 0]
+        course = course * np.where(stance[:, 1:-1], ratio[:, 1:], ratio[:, :1])
+        whole = np.floor(ends).astype(np.int64)
+        low = np.take_along_axis(course, whole, axis=1)
+        high = np.take_along_axis(course, whole + 1, axis=1)
+        off = low + (ends - whole) * (high - low) + now.wearer[:, 2:]
+        planned, _ = self._ahead(now, ends)
+        return np.asarray(planned[:, 1] + off)
 
     def _likelihood(
         self, view: KneeView, observation: ArrayLike, now: AnticipationState, samples: Array
@@ -223,25 +331,28 @@ class KneeAnticipation(RowController):
         return np.where(((planned | (stance & slack)) == stance)[:, None], fit, sure)
 
     def _demands(
-        self, view: KneeView, now: AnticipationState, ends: Array, more: Correction | None
-    ) -> tuple[Array, Array]:
+        self, view: KneeView, observation: ArrayLike, now: AnticipationState, ends: Array,
+        angle: Array, more: Correction | None,
+    ) -> tuple[Array, Array]:  # fmt: skip
         """Return stiffnesses [N/m] and weights at the nodes, shape (n_env, n_nodes)."""
         nominal, plan = self.observer.nominal, now.plan
-        samples, known = self._ahead(plan, ends)
+        samples, known = self._ahead(now, ends)
         weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
         if not self.observer.gait:
             return self._brace_stiffness(now, ends, samples[:, 0]), weight
-        tension, angle = samples[:, 0], samples[:, 1]
+        assert self.torque is not None
+        lever = nominal.plant.lever
         here, _ = self.phase.read(plan, np.zeros((len(ends), 1)))
-        deviation = view.angle - here[:, 1, 0]
-        free = nominal.free_tension(angle)
         stance = self._wholly_in_stance(plan, ends, now)
         together = view.stance & self._in_stance(here[:, 0], here[:, 1], now)[:, 0]
-        excess = np.where(together, view.reference - here[:, 0, 0], 0.0)
-        tension = tension + excess[:, None] * np.exp(-ends / KEPT)
+        sensed = self.torque.rows(observation)[0]
+        excess = np.where(together, sensed - lever.torque(here[:, 0, 0], here[:, 1, 0]), 0.0)
+        torque = lever.torque(samples[:, 0], samples[:, 1])
+        torque = torque + excess[:, None] * np.exp(-ends / KEPT)
+        tension = lever.tension(torque, angle)
         if more is not None:
             tension = tension + more(self.phase.present(plan)[:, None] + ends)
-        stretch = nominal.stretch(angle + deviation[:, None])
+        stretch, free = nominal.stretch(angle), nominal.free_tension(angle)
         weight = weight * np.where(stance, 1.0, SWING) * (stretch / USUAL_STRETCH) ** 2
         return np.where(stance, np.maximum(tension, 0.0), free) / stretch, weight
 
@@ -253,13 +364,46 @@ class KneeAnticipation(RowController):
         present = self.phase.present(plan)[:, None]
         times = self.phase.memory.within(plan.seen, present + ends)
         around = np.concatenate([np.floor(times), np.ceil(times)], axis=1)
-        samples, _ = self._ahead(plan, around - present)
+        samples, _ = self._ahead(now, around - present)
         before, after = np.hsplit(self._in_stance(samples[:, 0], samples[:, 1], now), 2)
         return np.asarray(before & after)
 
-    def _ahead(self, plan: Plan, ends: Array) -> tuple[Array, Rows]:
-        """Return the planned samples after ``ends`` periods, and where they are known."""
-        return self.phase.read(plan, ends)
+    def _place(self, plan: Plan, before: Array) -> Array:
+        """Return the present in the nominal stride, until the whole stride is in the plan."""
+        memory, step = self.phase.memory, plan.seen.step
+        if self.stride is None or np.all(step + memory.ahead[-1] > self.stride.length):
+            return before
+        ahead = memory.ahead[1:] if len(memory.ahead) > 1 else memory.ahead
+        seen, _ = memory.read(plan.seen, step[:, None] + ahead.astype(float))
+        return self.stride.phase(seen, ahead).astype(float)
+
+    def _ahead(self, now: AnticipationState, ends: Array) -> tuple[Array, Rows]:
+        """Return the planned samples after ``ends`` periods, and where they are known.
+
+        Others are those of the nominal stride, whose differences at the end of the preview fade.
+        """
+        plan, memory = now.plan, self.phase.memory
+        samples, known = self.phase.read(plan, ends)
+        if self.stride is None or np.all(known):
+            return samples, known
+        later = self.phase.present(plan)[:, None] + ends - plan.seen.step[:, None]
+        last = np.full((len(ends), 1), float(memory.ahead[-1]))
+        end, _ = memory.read(plan.seen, plan.seen.step[:, None] + last)
+        place = now.place[:, None]
+        nominal, there = self.stride.read(place + later), self.stride.read(place + last)
+        fades = np.exp(-np.maximum(later - last, 0.0) / KEPT)
+        angle = nominal[1] + (end[:, 1] - there[1]) * fades
+        nominal_stance, stance = self._loaded(nominal), self._loaded(there)
+        off = np.where(stance, end[:, 0] - there[0], 0.0)
+        free = self.observer.nominal.free_tension(angle) + now.offset[:, None]
+        tension = np.where(nominal_stance, nominal[0] + off * fades, free)
+        found = np.stack([np.maximum(tension, 0.0), angle], axis=1)
+        return np.where(known[:, None], samples, found), np.ones_like(known)
+
+    def _loaded(self, nominal: Array) -> Rows:
+        """Return where samples of the nominal stride, (2, ...), are in stance."""
+        free = self.observer.nominal.free_tension(nominal[1])
+        return np.asarray(np.abs(nominal[0] - free) > SMALLEST)
 
     def _brace_stiffness(self, now: AnticipationState, ends: Array, reference: Array) -> Array:
         """Return stiffnesses [N/m] of the brace alone for previewed references."""
@@ -288,9 +432,10 @@ def make_knee_anticipation(spec: Spec[KneeOrthosis], adaptive: bool = False) -> 
         observer,
         PhaseFilter(PreviewMemory.make(ahead, stride), spread),
         tuple(reader(signals, channel) for channel in names),
-        reader(signals, ["torque_reference"]) if gait else None,
+        reader(signals, ["torque_reference", "ground_force"]) if gait else None,
         reader(signals, ["pressure"]),
         RegulatorBank.make(plant, adaptive),
+        NominalStride(plant) if gait else None,
         adaptive,
         spec.actions["pressure_set_point"],
     )

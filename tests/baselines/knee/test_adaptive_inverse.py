@@ -1,4 +1,4 @@
-"""Adaptive inverse of the knee: estimates of gain and loop width, inverse, probe, trend, rows."""
+"""Adaptive inverse of the knee: estimates of gain and loop width, inverse, probe, rows."""
 
 import dataclasses
 
@@ -97,27 +97,6 @@ def test_probe_moves_the_setpoint_in_a_first_swing_alone():
             observation, *_ = env.step(action)
     assert probed
     assert all(PROBE[0] <= step < PROBE[1] and not stance for step, stance in probed)
-
-
-def test_tension_beyond_the_preview_goes_on_with_the_trend():
-    env = make_env("PAM/KneeWalk-v0")
-    forward = built("knee_adaptive_inverse", env).forward
-    ends, most, steps = np.arange(1.0, 120.0)[None], 0.0, np.ones(1)
-    for seed in range(4):
-        observation, _ = env.reset(seed=seed)
-        state = forward.initial_state(observation)
-        for _ in range(40):
-            state = forward.observed(observation, state)
-            samples, known = forward._ahead(state.plan, ends)
-            held, _ = forward.phase.read(state.plan, ends)
-            assert np.array_equal(samples[:, 0][known], held[:, 0][known])
-            assert np.array_equal(samples[:, 1], held[:, 1])
-            more = abs(samples[:, 0] - held[:, 0])[~known]
-            if more.max(initial=0.0) > max(most, 1.0):
-                most, steps = more.max(), np.diff(more)
-            observation, *_ = env.step(env.action_space.low)
-    assert most > 1.0
-    assert abs(steps[-1]) < 0.5 * abs(steps[0])  # the trend fades
 
 
 def test_row_of_a_batch_is_the_single_episode():

@@ -1,0 +1,84 @@
+"""Stride of the nominal wearer: planned tension and angle, before they have been previewed.
+
+The plan is that of the environments (yeh2010, sections 2 and 5): the orthosis gives a share of the
+torque of Eq. (1), low-passed at 5 Hz, from the ground force and the lean of the measured stride. It
+continues a preview beyond its end in a stride that has not been seen; the phase is that at which it
+fits the previewed samples best.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.arrays import Array
+from pam_envs.constants import GRAVITY
+from pam_envs.mechanics.leg import centre_of_pressure
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from pam_envs.references.gait import NATURAL_STRIDE, gait_curves, vertical_load
+from pam_envs.sensing.butterworth import filtered
+from pam_envs.sensing.shoe import estimated_torque, heel_load
+
+RATIO = 0.2
+"""Share of the knee torque that the orthosis gives: yeh2010, section 5."""
+TENSION_MISFIT, ANGLE_MISFIT = 20.0, 0.02
+"""Differences from a previewed tension [N] and angle [rad] that count alike."""
+
+
+@dataclass(frozen=True)
+class NominalStride:
+    """Planned stride of a nominal plant on a leg."""
+
+    plant: KneeOrthosis
+
+    @property
+    def length(self) -> float:
+        """Duration of the stride [control periods]."""
+        return self.plant.stride.time / self.plant.control_period
+
+    @cached_property
+    def samples(self) -> Array:
+        """Tension [N] and angle [rad], shape (2, n_points), evenly over the stride."""
+        plant, points = self.plant, math.ceil(self.length)
+        leg, shoe = plant.leg, plant.shoe
+        phases = np.arange(points) / points
+        found, table = gait_curves(plant.activity, phases), plant.gait_table()
+        angle = plant.lever.mount_angle + found["knee"]
+        quick = NATURAL_STRIDE / plant.stride.time
+        torque, stance = np.zeros(points), np.zeros(points, bool)
+        for i, phase in enumerate(phases):
+            loaded = vertical_load(table, phase, quick)
+            force = leg.body_mass * GRAVITY * max(0.0, loaded)
+            cop = centre_of_pressure(
+                found["cop"][i], found["ground_x"][i], loaded, quick, leg.aim_height, shoe.heel,
+                shoe.tip,
+            )  # fmt: skip
+            shank, ankle = found["shank"][i], found["ankle"][i]
+            lean = shank + shoe.flat_foot * (ankle - shank)
+            torque[i] = RATIO * estimated_torque(force, cop, math.sin(lean), leg.shank)
+            stance[i] = heel_load(force, cop, shoe.heel, shoe.tip) > shoe.threshold
+        torque = np.where(stance, filtered(np.tile(torque, 2))[points:], 0.0)
+        return np.stack([np.maximum(plant.lever.tension(torque, angle), 0.0), angle])
+
+    def phase(self, seen: Array, ahead: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the point of the stride at present, shape (n_env,).
+
+        Parameters
+        ----------
+        seen : ndarray, shape (n_env, 2, n_samples)
+            Previewed tension [N] and angle [rad].
+        ahead : ndarray of int, shape (n_samples,)
+            Times of the samples from the present [control periods].
+        """
+        at = np.arange(self.samples.shape[1])[:, None] + ahead
+        off = seen[:, :, None] - self.read(at)
+        off /= np.array([TENSION_MISFIT, ANGLE_MISFIT])[:, None, None]
+        return np.argmin(np.add.reduce(off**2, axis=(1, 3)), axis=1)
+
+    def read(self, points: NDArray[np.generic]) -> Array:
+        """Return tension [N] and angle [rad] at the nearest points of the stride, (2, ...)."""
+        count = self.samples.shape[1]
+        near = np.floor(points * (count / self.length) + 0.5).astype(np.int64)
+        return self.samples[:, near % count]

@@ -1,0 +1,103 @@
+"""Deviation of the wearer's knee from his path under the assistance, over a horizon.
+
+The tension of a torque depends on the angle, and the angle on the torque: the wearer holds his path
+like a spring and a damper (:mod:`pam_envs.mechanics.leg`), and the brace, which has a torque,
+damping and inertia of its own, pushes him off it by ``e``:
+
+    (I + I_brace) e'' = -(tau_a + D q' + I_brace q'' - borne) - K e - B e'
+
+with the path ``q`` and the torque of the wire ``borne`` by the wearer. ``K`` and ``B`` increase
+with the load on the leg. In stance the deviation is a few hundredths of a radian and settles within
+60 ms, about the dead time of the regulator: a prediction that keeps it constant is late by most of
+a control period.
+
+The nominal leg is integrated along the sensed load and the torques of the nominal brace. What then
+remains of the sensed angle is attributed to the path.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pam_envs.arrays import Array
+from pam_envs.constants import GRAVITY
+from pam_envs.kernels.build import entry
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+
+SUBSTEPS = 2
+"""Sub-steps of a control period."""
+
+
+@dataclass(frozen=True)
+class WearerModel:
+    """Leg and brace of a nominal plant."""
+
+    plant: KneeOrthosis
+
+    @cached_property
+    def _hold(self) -> Array:
+        """Stiffness [N m/rad] and damping [N m s/rad] without load, and what a load adds."""
+        leg = self.plant.leg
+        upright = leg.mass * GRAVITY * leg.centre
+        return np.array(
+            [
+                leg.stiffness + leg.hold_stiffness + upright,
+                leg.damping + leg.hold_damping + self.plant.lever.damping,
+                leg.stance_stiffness,
+                leg.stance_damping,
+                1.0 / (leg.inertia + self.plant.lever.inertia),
+            ]
+        )
+
+    def load(self, ground_force: Array) -> Array:
+        """Return the load on the leg [1], from the vertical ground force [N]."""
+        return ground_force / (self.plant.leg.body_mass * GRAVITY)
+
+    def passive(self, path: Array) -> Array:
+        """Return the torque [N m] that carries the brace along a path.
+
+        ``path``, shape (n_env, n + 2), are angles [rad] a control period apart; the torque is that
+        of all but the first and the last, shape (n_env, n).
+        """
+        period, lever = self.plant.control_period, self.plant.lever
+        rate = (path[:, 2:] - path[:, :-2]) / (2.0 * period)
+        bend = (path[:, 2:] - 2.0 * path[:, 1:-1] + path[:, :-2]) / period**2
+        past = np.maximum(path[:, 1:-1] - lever.relaxed_angle, 0.0)
+        borne = self.plant.leg.habituation * lever.stiffness * past
+        return np.asarray(lever.damping * rate + lever.inertia * bend - borne)
+
+    def along(self, start: Array, torque: Array, load: Array) -> Array:
+        """Return deviations [rad] and their rates [rad/s], shape (n_env, n + 1, 2).
+
+        Parameters
+        ----------
+        start : ndarray, shape (n_env, 2)
+            Deviation [rad] and its rate [rad/s].
+        torque : ndarray, shape (n_env, n)
+            Torque on the leg [N m] in each control period, extension positive.
+        load : ndarray, shape (n_env, n)
+            Load on the leg [1].
+        """
+        found = np.empty((*torque.shape, 2))
+        begin, given = np.ascontiguousarray(start), np.ascontiguousarray(torque)
+        step = self.plant.control_period / SUBSTEPS
+        push_rows(begin, given, np.ascontiguousarray(load), self._hold, step, found)
+        return np.concatenate([begin[:, None], found], axis=1)
+
+
+@entry
+def push_rows(
+    start: Array, torque: Array, load: Array, hold: Array, step: float, found: Array
+) -> None:
+    """Write deviations and their rates at the ends of control periods."""
+    for i in range(len(start)):
+        off, rate = start[i, 0], start[i, 1]
+        for k in range(torque.shape[1]):
+            stiffness = hold[0] + hold[2] * load[i, k]
+            damping = hold[1] + hold[3] * load[i, k]
+            for _ in range(SUBSTEPS):
+                push = (-torque[i, k] - stiffness * off) * hold[4]
+                rate = (rate + step * push) / (1.0 + step * damping * hold[4])
+                off = off + step * rate
+            found[i, k, 0], found[i, k, 1] = off, rate
