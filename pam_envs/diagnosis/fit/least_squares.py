@@ -232,8 +232,11 @@ class Problem:
             outputs[np.isnan(self.measured)] = 0.0
         apart = outputs.transpose(2, 0, 1)
         if len(self.shapes):
+            diverged = np.abs(outputs) >= WORST
+            values = outputs[diverged]
             for k, (shapes, solver) in enumerate(self._solvers):
                 apart[:, k] -= (apart[:, k] @ solver.T) @ shapes
+            outputs[diverged] = values  # no shape explains a simulation that diverged
         flat = apart.reshape(len(columns), -1)
         return self.vectors(flat, self.violations(columns))
 

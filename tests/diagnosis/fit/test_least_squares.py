@@ -202,3 +202,16 @@ def test_hardly_determined_parameter_does_not_shorten_boxed_steps_of_others():
     assert abs(one.values()["gain"] - 1.0) < 0.01
     assert abs(boxed.values()["gain"] - 2.0) < 0.01
     assert boxed.cost < one.cost
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
+def test_no_shape_explains_a_diverged_simulation(value):
+    measured = np.zeros((1, len(TIME)))
+    shapes = np.ones((1, len(TIME)))
+
+    def simulate(columns: Array) -> Array:
+        return np.full((1, len(TIME), len(columns)), value)
+
+    train = np.ones(len(TIME), bool)
+    problem = Problem(simulate, measured, NOISE[:1], train, TIME, shapes=shapes)
+    assert (problem.residuals(np.zeros((2, 1))) == WORST).all()
