@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from pam_envs.arrays import Array
 from pam_envs.diagnosis.cause import Cause, Form
 from pam_envs.diagnosis.fit import least_squares as lsq
 from pam_envs.diagnosis.fit.blocks import Blocks
+
+Name = TypeVar("Name")
 
 POLISH = 6  # largest number of rounds with the full Jacobian
 RACE = 6  # rounds after which only the best of several starts continues
@@ -77,7 +79,9 @@ def initial_fits(
     return fits
 
 
-def polish(problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH) -> None:
+def polish(
+    problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH, boxed: bool = False
+) -> None:
     """Improve fits in all their parameters, at first with the Jacobian of their base."""
     for fit in fits:
         if fit.shared is not None and len(fit.slopes):
@@ -85,7 +89,7 @@ def polish(problem: lsq.Problem, fits: Sequence[lsq.Fit], rounds: int = POLISH) 
         elif len(fit.slopes) != len(fit.frees):
             fit.take(fit.slopes[:0])
         fit.done, fit.damping, fit.shared = False, 1.0, None
-    lsq.improve(problem, fits, rounds, POLISHED_ENOUGH)
+    lsq.improve(problem, fits, rounds, POLISHED_ENOUGH, boxed=boxed)
 
 
 def complete_jacobian(problem: lsq.Problem, fit: lsq.Fit) -> None:
@@ -137,9 +141,9 @@ def refit(
     return Candidate(candidate.causes, fit, blocks.errors(problem.rows(fit.residual)))
 
 
-def best_by_name(fits: Iterable[tuple[str, lsq.Fit]]) -> dict[str, lsq.Fit]:
+def best_by_name(fits: Iterable[tuple[Name, lsq.Fit]]) -> dict[Name, lsq.Fit]:
     """Return the fit of the least cost for each name."""
-    best: dict[str, lsq.Fit] = {}
+    best: dict[Name, lsq.Fit] = {}
     for name, fit in fits:
         if name not in best or fit.cost < best[name].cost:
             best[name] = fit
@@ -161,31 +165,44 @@ def without_each_cause(
     only: Collection[str] | None = None,
     clear: float = np.inf,
 ) -> dict[str, Candidate]:
-    """Return the model refitted without each cause that the base lacks, the better of two starts.
+    """Return the model refitted without each cause that the base lacks, the best of its starts.
+
+    The parameters that a model has beside the base's and its causes' (calibrations) were fitted
+    together with the cause that is left out, and may hold the refit in a local optimum: one start
+    is at the base and without them.
 
     ``only`` are the names of the causes to leave out (default: each). A refit that still loses a
     gain of ``clear`` after a few rounds is not polished.
     """
     fits, labels = [], []
     complete_jacobian(problem, model.fit)
+    known = dict(zip((f.name for f in base.fit.frees), base.fit.z, strict=True))
     for removed, form in model.causes:
         if removed.name in base.names or (only is not None and removed.name not in only):
             continue
         dropped = {t.name for t in form.terms}
         kept = [k for k, f in enumerate(model.fit.frees) if f.name not in dropped]
         frees, z = tuple(model.fit.frees[k] for k in kept), model.fit.z[kept]
-        known = dict(zip((f.name for f in base.fit.frees), base.fit.z, strict=True))
         of_base = np.array([known.get(f.name, v) for f, v in zip(frees, z, strict=True)])
         for start in (z, of_base):
             fit = restarted(model.fit, frees=frees, z=start.copy(), shared=None)
             fit.take(model.fit.slopes[kept])
             fits.append(fit)
             labels.append(removed.name)
+        used = {t.name for cause, form in model.causes if cause is not removed for t in form.terms}
+        judged = [f.name in known or f.name in used for f in frees]
+        if not all(judged):
+            some = tuple(f for f, n in zip(frees, judged, strict=True) if n)
+            column = base.fit.column
+            fits.append(
+                restarted(model.fit, frees=some, z=of_base[judged], column=column, shared=None)
+            )
+            labels.append(removed.name)
     if not fits:
         return {}
     lsq.evaluate(problem, fits)
-    pairs = zip(labels[::2], fits[::2], fits[1::2], strict=True)
-    named = [(name, fit) for name, *both in pairs for fit in lsq.near(both)]
+    starts = {name: [f for f, n in zip(fits, labels, strict=True) if n == name] for name in labels}
+    named = [(name, fit) for name, several in starts.items() for fit in lsq.near(several)]
     lsq.improve(problem, [fit for _, fit in named], FEW_ROUNDS, 1e-4, lsq.FEW_DAMPINGS)
     best = best_by_name(named)
     close = [f for f in best.values() if np.log(f.cost / model.fit.cost) < clear]

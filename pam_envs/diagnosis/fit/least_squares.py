@@ -232,8 +232,11 @@ class Problem:
             outputs[np.isnan(self.measured)] = 0.0
         apart = outputs.transpose(2, 0, 1)
         if len(self.shapes):
+            diverged = np.abs(outputs) >= WORST
+            values = outputs[diverged]
             for k, (shapes, solver) in enumerate(self._solvers):
                 apart[:, k] -= (apart[:, k] @ solver.T) @ shapes
+            outputs[diverged] = values  # no shape explains a simulation that diverged
         flat = apart.reshape(len(columns), -1)
         return self.vectors(flat, self.violations(columns))
 
@@ -415,11 +418,13 @@ def normal_equations(problem: Problem, fit: Fit) -> tuple[Array, Array]:
     return normal, gradient
 
 
-def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> Array:
-    """Return the coordinates reached with each damping, shape (dampings, n).
+def _steps(problem: Problem, fit: Fit, dampings: Sequence[float], boxed: bool) -> Array:
+    """Return the coordinates reached with each damping, shape (steps, n).
 
     Where the leading parameters have a shared Jacobian, which holds only near the base's optimum, a
-    further step moves the others alone.
+    further step moves the others alone. A step beyond the reach is shortened; with ``boxed``
+    another one keeps each parameter within its own reach, since one that the data hardly determine
+    would shorten the step of all.
     """
     normal, gradient = normal_equations(problem, fit)
     table = fit.table
@@ -431,13 +436,19 @@ def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> Array:
     moves = [(every, damping) for damping in dampings]
     if fit.held:
         moves.append((slice(fit.held, None), dampings[0]))
+    box = reach * scale
     tried = []
     for part, relative in moves:
-        step = np.zeros(len(slope))
         equations = scaled[part, part], slope[part], fit.damping * relative
+        step = np.zeros(len(slope))
         step[part] = bounded_step(*equations, low[part], high[part])
-        step /= scale
-        tried.append(fit.z + step / max(1.0, float(np.max(np.abs(step) / reach))))
+        longest = max(1.0, float(np.max(np.abs(step) / box)))
+        tried.append(fit.z + step / scale / longest)
+        if boxed and longest > 1.0:
+            within = np.zeros(len(slope))
+            limits = np.maximum(low, -box)[part], np.minimum(high, box)[part]
+            within[part] = bounded_step(*equations, *limits)
+            tried.append(fit.z + within / scale)
     return np.array(tried)
 
 
@@ -470,11 +481,13 @@ def improve(
     tolerance: float,
     dampings: Sequence[float] = DAMPINGS,
     renew: bool = True,
+    boxed: bool = False,
 ) -> None:
     """Improve fits by damped Gauss-Newton steps, all fits side by side.
 
     A fit ends when a step decreases its cost by less than ``tolerance``, relative to the cost, and
-    with ``renew`` only if its Jacobian was fresh.
+    with ``renew`` only if its Jacobian was fresh. With ``boxed`` steps that are limited for each
+    parameter are tried too.
     """
     for _ in range(rounds):
         active = [f for f in fits if not f.done]
@@ -483,11 +496,13 @@ def improve(
         differentiate(problem, [f for f in active if f.held or not len(f.slopes)])
         if renew:
             differentiate(problem, [f for f in active if not f.held], RENEWED)
-        tried = [_steps(problem, f, dampings) for f in active]
+        tried = [_steps(problem, f, dampings, boxed) for f in active]
         columns = [c for f, zs in zip(active, tried, strict=True) for c in column_of(f, zs)]
         found = _simulate(problem, columns, _in_spare_lanes(active, len(columns)))
-        for i, (fit, zs) in enumerate(zip(active, tried, strict=True)):
-            part = slice(i * len(zs), (i + 1) * len(zs))
+        at = 0
+        for fit, zs in zip(active, tried, strict=True):
+            part = slice(at, at + len(zs))
+            at = part.stop
             costs = _costs(problem, fit, zs, found[part])
             best = int(np.argmin(costs))
             cost = float(costs[best])

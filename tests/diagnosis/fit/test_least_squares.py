@@ -182,3 +182,36 @@ def test_confidence_intervals_have_nominal_coverage(correlation):
     assert (hits / draws >= 0.83).all()  # nominally 95 %; 60 draws give 83 % once in 10,000
     width = np.diff(spans(problem, blocks, fit)["gain"]["interval"])[0]
     assert 0.001 < width < 0.2
+
+
+def test_hardly_determined_parameter_does_not_shorten_boxed_steps_of_others():
+    time = TIME[:, None]
+
+    def hardly(columns: Array) -> Array:
+        gain, faint = columns.T[:, None, :]
+        wave = gain * np.sin(time) + 1e-7 * faint * np.cos(7.0 * time)
+        return np.stack([wave, 3.0 * wave])
+
+    measured = hardly(np.array([[2.0, 1e6]]))[:, :, 0]
+    problem = Problem(hardly, measured, NOISE, np.ones(len(TIME), bool), TIME)
+    faint = Free("faint", 1, -1e9, 1e9, 0.1)
+    one, boxed = (Fit.at_start((GAIN, faint), np.array([1.0, 0.0])) for _ in range(2))
+    evaluate(problem, [one, boxed])
+    improve(problem, [one], 1, 1e-9)
+    improve(problem, [boxed], 1, 1e-9, boxed=True)
+    assert abs(one.values()["gain"] - 1.0) < 0.01
+    assert abs(boxed.values()["gain"] - 2.0) < 0.01
+    assert boxed.cost < one.cost
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
+def test_no_shape_explains_a_diverged_simulation(value):
+    measured = np.zeros((1, len(TIME)))
+    shapes = np.ones((1, len(TIME)))
+
+    def simulate(columns: Array) -> Array:
+        return np.full((1, len(TIME), len(columns)), value)
+
+    train = np.ones(len(TIME), bool)
+    problem = Problem(simulate, measured, NOISE[:1], train, TIME, shapes=shapes)
+    assert (problem.residuals(np.zeros((2, 1))) == WORST).all()
