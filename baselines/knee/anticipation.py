@@ -187,8 +187,9 @@ class KneeAnticipation(RowController):
         arrival = self.bank.arrival(now.bank)
         later = self.observer.nominal.along(arrival.pressures, now.hysteresis)
         ends = arrival.delay[:, None] + ENDS
-        angle = self._angles_ahead(view, observation, now, arrival, ends)
-        stiffness, weight = self._demands(view, observation, now, ends, angle, more)
+        planned = self._ahead(now, ends)
+        angle = self._angles_ahead(view, observation, now, arrival, ends, planned[0])
+        stiffness, weight = self._demands(view, observation, now, ends, planned, angle, more)
         path = (inverse or partial(self._inverse, now.moments))(stiffness, later)
         reach = (arrival.rate * self.bank.period)[:, None] * np.array(BLOCKS, float)
         start = arrival.pressures[-1]
@@ -275,7 +276,7 @@ class KneeAnticipation(RowController):
 
     def _angles_ahead(
         self, view: KneeView, observation: ArrayLike, now: AnticipationState, arrival: Arrival,
-        ends: Array,
+        ends: Array, planned: Array,
     ) -> Array:  # fmt: skip
         """Return the predicted angles [rad] at the nodes of a gait, (n_env, n_nodes).
 
@@ -295,9 +296,8 @@ class KneeAnticipation(RowController):
         middle = 0.5 * (path[:, 1:-2] + path[:, 2:-1]) + here
         hysteresis, gain = now.hysteresis, now.moments[:, 1] / now.moments[:, 0]
         for k, pressure in enumerate(arrival.pressures):
-            stiffness = np.maximum(nominal.stiffness_after(pressure, hysteresis), 0.0)
-            hysteresis = nominal.advance(pressure, hysteresis)
-            tension = gain * stiffness * nominal.stretch(middle[:, k])
+            stiffness, hysteresis = nominal.forward(pressure, hysteresis)
+            tension = gain * np.maximum(stiffness, 0.0) * nominal.stretch(middle[:, k])
             given = lever.torque(tension, middle[:, k])
             torque[:, k] = np.where(k < arrival.delay, given, torque[:, k])
         torque = torque + self._leg.passive(path)[:, :last]
@@ -311,7 +311,6 @@ class KneeAnticipation(RowController):
         low = np.take_along_axis(course, whole, axis=1)
         high = np.take_along_axis(course, whole + 1, axis=1)
         off = low + (ends - whole) * (high - low) + now.wearer[:, 2:]
-        planned, _ = self._ahead(now, ends)
         return np.asarray(planned[:, 1] + off)
 
     def _likelihood(
@@ -332,11 +331,10 @@ class KneeAnticipation(RowController):
 
     def _demands(
         self, view: KneeView, observation: ArrayLike, now: AnticipationState, ends: Array,
-        angle: Array, more: Correction | None,
+        planned: tuple[Array, Rows], angle: Array, more: Correction | None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return stiffnesses [N/m] and weights at the nodes, shape (n_env, n_nodes)."""
-        nominal, plan = self.observer.nominal, now.plan
-        samples, known = self._ahead(now, ends)
+        nominal, plan, (samples, known) = self.observer.nominal, now.plan, planned
         weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
         if not self.observer.gait:
             return self._brace_stiffness(now, ends, samples[:, 0]), weight

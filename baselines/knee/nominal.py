@@ -78,9 +78,14 @@ class KneeNominal:
         empty = self.hysteresis.initial(len(pressure))
         return self.advance(pressure, self.advance(np.zeros_like(pressure), empty))
 
+    def forward(self, pressure: Array, state: RowsState) -> tuple[Array, RowsState]:
+        """Return the stiffness [N/m] at a pressure [Pa] after a history, and the state then."""
+        output, after = self.hysteresis.forward(pressure, state)
+        return self.per_output * output, after
+
     def advance(self, pressure: Array, state: RowsState) -> RowsState:
         """Return the hysteresis state after a pressure [Pa]."""
-        return self.hysteresis.forward(pressure, state)[1]
+        return self.forward(pressure, state)[1]
 
     def along(self, pressures: Array, state: RowsState) -> RowsState:
         """Return the state after pressures [Pa] one after the other, shape (n_steps, n_env)."""
@@ -88,7 +93,7 @@ class KneeNominal:
 
     def stiffness_after(self, pressure: Array, state: RowsState) -> Array:
         """Return the stiffness [N/m] at a pressure [Pa] that the history ends with."""
-        return self.per_output * self.hysteresis.forward(pressure, state)[0]
+        return self.forward(pressure, state)[0]
 
     def pressure_for(self, stiffness: Array, state: RowsState) -> Array:
         """Return the pressure [Pa], within the capacity, for a stiffness [N/m] after a history."""

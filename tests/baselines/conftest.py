@@ -46,6 +46,16 @@ def built(name: str, env: Any, plant: Any = None, seed: int = 0, **knobs: float)
     return make_controller(name, model, env.signals, env.action_signals, seed, knobs)
 
 
+def last_state(env: Any, controller: Controller, seed: int = 1) -> tuple[Any, dict[str, Any]]:
+    """Return the controller's state and the info at the end of an episode."""
+    observation, info = env.reset(seed=seed)
+    state, over = None, False
+    while not over:
+        action, state = controller.predict(observation, state, state is None)
+        observation, _, _, over, info = env.step(action)
+    return state, info
+
+
 def rollout(env: Any, controller: Controller) -> dict[str, np.ndarray]:
     """Return the recorded info of one whole episode, and the first action's command [SI]."""
     observation, _ = env.reset(seed=1)

@@ -11,7 +11,7 @@ from baselines.predictive.regulator import RegulatorBank
 from pam_envs.constants import GRAVITY
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
-from tests.baselines.conftest import built, make_env, rms, rollout
+from tests.baselines.conftest import built, last_state, make_env, rms, rollout
 
 JOINT, ARM = "PAM/AntagonisticJoint-v0", "PAM/RedundantManipulator-v0"
 STOCK = AntagonisticJoint.paper()
@@ -97,11 +97,7 @@ def test_observed_torque_is_the_weight_of_a_heavier_link():
     heavier = QUIET.replace({"link.mass": 1.5 * QUIET.link.mass})
     env = make_env(JOINT, plant=heavier, reference=hold, episode_seconds=4.0)
     controller = built("joint_predictive", env, STOCK)
-    observation, _ = env.reset(seed=1)
-    state, over = None, False
-    while not over:
-        action, state = controller.predict(observation, state, state is None)
-        observation, _, _, over, info = env.step(action)
+    state, info = last_state(env, controller)
     moment = 0.5 * QUIET.link.mass * QUIET.link.centre
     expected = -moment * GRAVITY * np.sin(info["output"])
     assert state.disturbance[0, 0] == pytest.approx(expected, rel=0.1)

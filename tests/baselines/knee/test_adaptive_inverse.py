@@ -13,7 +13,7 @@ from baselines.knee.adaptive_inverse import (
     make_knee_adaptive_inverse,
 )
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
-from tests.baselines.conftest import built, make_env, rms, rollout
+from tests.baselines.conftest import built, last_state, make_env, rms, rollout
 
 TENSION = "PAM/KneeTension-v0"
 GAIN, WIDTH = 1.08, 0.7
@@ -36,11 +36,7 @@ def settled_error(name: str) -> float:
 def test_loop_width_and_gain_are_estimated():
     env, nominal = other_muscle()
     controller = built("knee_adaptive_inverse", env, nominal)
-    observation, _ = env.reset(seed=1)
-    state, over = None, False
-    while not over:
-        action, state = controller.predict(observation, state, state is None)
-        observation, _, _, over, _ = env.step(action)
+    state, _ = last_state(env, controller)
     a, b = state.estimate[0]
     assert a == pytest.approx(GAIN, rel=0.03)
     assert b / a == pytest.approx(WIDTH, abs=0.06)

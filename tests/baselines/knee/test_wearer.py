@@ -10,7 +10,7 @@ from baselines.knee.anticipation import make_knee_anticipation
 from baselines.knee.stride import NominalStride
 from baselines.knee.wearer import WearerModel
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
-from tests.baselines.conftest import built, make_env, rms, rollout
+from tests.baselines.conftest import built, last_state, make_env, rms, rollout
 from tests.baselines.knee.test_anticipation import tracked
 
 GAITS = {"KneeWalk": "walk", "KneeStairsUp": "stairs_up", "KneeStairsDown": "stairs_down"}
@@ -54,11 +54,7 @@ def test_prediction_is_not_late():
 def test_compliance_of_another_wearer_is_estimated(stiffness):
     env, nominal = quiet_walk(leg__stance_stiffness=stiffness)
     controller = built("knee_anticipating", env, nominal)
-    observation, _ = env.reset(seed=3)
-    state, over = None, False
-    while not over:
-        action, state = controller.predict(observation, state, state is None)
-        observation, _, _, over, _ = env.step(action)
+    state, _ = last_state(env, controller, seed=3)
     ratio = (state.yielding[0, :, 1] / state.yielding[0, :, 0])[1]
     expected = 250.0 / stiffness
     assert abs(ratio - expected) < 0.5 * abs(1.0 - expected)
