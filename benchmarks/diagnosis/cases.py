@@ -6,7 +6,7 @@ noise-free clean rig. A case gives a target size, for which the amplitude is sol
 sees only recording and rig file.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import combinations
 from typing import Any
@@ -305,6 +305,14 @@ def first_seed(selected: str, offset: int = 0) -> int:
     if not 0 <= offset < 100:
         raise ValueError(f"seed offset {offset} is outside [0, 99]; choose another")
     return 10_000_000 * (SETS[selected] + 1) + 100_000 * offset
+
+
+def check_each(each: Mapping[str, int] | None, most: Mapping[str, int]) -> None:
+    """Raise ``ValueError`` if a kind of ``each`` does not exist, or has fewer cases than asked."""
+    for kind, number in (each or {}).items():
+        if not 0 <= number <= most.get(kind, -1):
+            known = ", ".join(f"{name} (at most {n})" for name, n in most.items())
+            raise ValueError(f"--each {kind} {number}: there are {known}")
 
 
 def sizes_in(low: float, high: float, number: int, rng: np.random.Generator) -> Array:

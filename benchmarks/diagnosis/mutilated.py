@@ -21,15 +21,13 @@ import yaml
 from benchmarks.diagnosis.cases import CAMPAIGNS, Case, first_seed
 from benchmarks.diagnosis.counts import Numbers, share
 from benchmarks.diagnosis.example import csv_text, rig_content
-from benchmarks.diagnosis.markdown import bullets, share_text, table
+from benchmarks.diagnosis.markdown import bullets, share_text, table, write_page
 from benchmarks.diagnosis.sources import columns_of, draw_effect, draw_rig, sheet_of
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import provenance
-from benchmarks.runs.store import write_record
 from pam_envs.data.recording.recording import Recording, read_input
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.diagnosis import diagnose
-from pam_envs.files import write_text
 from tests.diagnosis.hidden import EFFECTS
 
 NUMBER = 500
@@ -300,7 +298,5 @@ def page(made: Numbers, arguments: str) -> str:
 def write(records: Sequence[Mapping[str, Any]], folder: Path, arguments: str = "") -> list[Path]:
     """Write ``diagnosis_mutilated.md`` and ``.json`` and return their paths."""
     made = figures(records)
-    paths = [folder / f"diagnosis_mutilated.{kind}" for kind in ("md", "json")]
-    write_text(paths[0], page(made, arguments))
-    write_record(paths[1], {"schema": 1, "arguments": arguments, "figures": made})
-    return paths
+    numbers = {"arguments": arguments, "figures": made}
+    return write_page(folder / "diagnosis_mutilated", page(made, arguments), **numbers)

@@ -19,6 +19,7 @@ from benchmarks.diagnosis.cases import (
     ROUNDS,
     Case,
     Unmade,
+    check_each,
     first_seed,
     loudest,
     sizes_in,
@@ -73,10 +74,7 @@ def cases(offset: int = 0, each: Mapping[str, int] | None = None) -> list[Case]:
     ValueError
         If a kind does not exist, or has fewer cases.
     """
-    for kind, number in (each or {}).items():
-        if not 0 <= number <= EACH.get(kind, -1):
-            known = ", ".join(f"{name} (at most {most})" for name, most in EACH.items())
-            raise ValueError(f"--each {kind} {number}: there are {known}")
+    check_each(each, EACH)
     numbers = {kind: (each or EACH).get(kind, 0) for kind in EACH}
     made = []
     for k, place in enumerate(PLACES):

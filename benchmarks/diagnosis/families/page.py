@@ -9,9 +9,15 @@ import numpy as np
 
 from benchmarks.diagnosis.counts import Answer, Numbers, firsts, line, share, spread
 from benchmarks.diagnosis.families.cases import PLACES, effects_of, parts_of
-from benchmarks.diagnosis.markdown import bullets, number, share_text, table
-from benchmarks.runs.store import write_record
-from pam_envs.files import write_text
+from benchmarks.diagnosis.markdown import (
+    bullets,
+    counted,
+    named_counts,
+    number,
+    share_text,
+    table,
+    write_page,
+)
 from tests.diagnosis.pair_worlds import FAMILIES
 
 PREFACE = Path(__file__).with_suffix(".md")
@@ -80,8 +86,12 @@ def page(made: Numbers, arguments: str) -> str:
     parts += ["\n## By family and world\n\n", _table("family and world", made["places"])]
     parts += ["\n## By cause\n\n", _causes_table(made)]
     alarms = {name: found["alarms"] for name, found in made["families"].items()}
-    lines = [f"`{name}`, names on clean rigs: {_named(found)}" for name, found in alarms.items()]
-    lines.append(f"effects that did not reach their size, not diagnosed: {_named(made['unmade'])}")
+    lines = [
+        f"`{name}`, names on clean rigs: {named_counts(found)}" for name, found in alarms.items()
+    ]
+    lines.append(
+        f"effects that did not reach their size, not diagnosed: {named_counts(made['unmade'])}"
+    )
     parts += ["\n## Further counts\n\n", bullets(lines)]
     if made["failures"]:
         parts += ["\n## Failed runs\n\n", bullets(made["failures"])]
@@ -95,14 +105,10 @@ def _table(what: str, rows: Mapping[str, Numbers]) -> str:
     for name, found in rows.items():
         cells = [f"`{name}`", found["right_first"]["n"], share_text(found["right_first"])]
         keys = ("exact", "wrong", "unexplained", "false_names", "unexplained_clean")
-        cells += [_counted(found[key]) for key in keys]
+        cells += [counted(found[key]) for key in keys]
         cells += [number(found["error"]), number(found["runtime_s"]["median"], ".0f")]
         lines.append(cells)
     return table(head, lines, True)
-
-
-def _counted(found: Numbers) -> str:
-    return f"{found['count']} of {found['n']}"
 
 
 def _causes_table(made: Numbers) -> str:
@@ -114,20 +120,14 @@ def _causes_table(made: Numbers) -> str:
         mistaken: Counter[str] = Counter()
         for one in found:
             mistaken.update(one["mistaken"] if one else {})
-        shares = [_counted(one["right_first"]) if one else "-" for one in found]
-        rows.append([f"`{name}`", *shares, _named(dict(mistaken.most_common()))])
+        shares = [counted(one["right_first"]) if one else "-" for one in found]
+        rows.append([f"`{name}`", *shares, named_counts(dict(mistaken.most_common()))])
     return table(head, rows, True)
-
-
-def _named(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"`{name}` {n}" for name, n in counts.items()) or "none"
 
 
 def write(records: Sequence[Mapping[str, Any]], folder: Path, arguments: str = "") -> list[Path]:
     """Write ``diagnosis_families.md`` and ``diagnosis_families.json`` and return their paths."""
     made = figures(records)
-    paths = [folder / f"diagnosis_families.{kind}" for kind in ("md", "json")]
-    write_text(paths[0], page(made, arguments))
-    lines = [line(Answer.of(record)) for record in records if not record.get("unmade")]
-    write_record(paths[1], {"schema": 1, "arguments": arguments, "figures": made, "cases": lines})
-    return paths
+    cases = [line(Answer.of(record)) for record in records if not record.get("unmade")]
+    numbers = {"arguments": arguments, "figures": made, "cases": cases}
+    return write_page(folder / "diagnosis_families", page(made, arguments), **numbers)

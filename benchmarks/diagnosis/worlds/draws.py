@@ -10,7 +10,7 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from benchmarks.diagnosis.cases import LACKING, LARGE, Case, first_seed, sizes_in
+from benchmarks.diagnosis.cases import LACKING, LARGE, Case, check_each, first_seed, sizes_in
 from benchmarks.diagnosis.sources import WORLDS
 from tests.diagnosis.hidden import EFFECTS
 from tests.diagnosis.worlds import OUTSIDE
@@ -35,10 +35,7 @@ def cases(offset: int = 0, each: Mapping[str, int] | None = None) -> list[Case]:
     ValueError
         If a kind does not exist, or has fewer cases.
     """
-    for kind, number in (each or {}).items():
-        if not 0 <= number <= EACH.get(kind, -1):
-            known = ", ".join(f"{name} (at most {most})" for name, most in EACH.items())
-            raise ValueError(f"--each {kind} {number}: there are {known}")
+    check_each(each, EACH)
     made: list[Case] = []
     for i, world in enumerate(WORLDS):
         for k, kind in enumerate(EACH):

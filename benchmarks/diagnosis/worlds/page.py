@@ -9,16 +9,17 @@ from benchmarks.diagnosis.counts import Answer, Numbers, line
 from benchmarks.diagnosis.markdown import (
     bound_text,
     bullets,
+    counted,
+    named_counts,
     number,
     percent,
     reached,
     share_text,
     table,
+    write_page,
 )
 from benchmarks.diagnosis.sources import HELD_OUT
 from benchmarks.diagnosis.worlds.counts import GROUPS, figures
-from benchmarks.runs.store import write_record
-from pam_envs.files import write_text
 
 PREFACE = Path(__file__).with_suffix(".md")
 TITLES = {"held_out": "held-out worlds", "tuned": "worlds of development", "all": "all worlds"}
@@ -105,12 +106,8 @@ def _worlds_table(made: Numbers) -> str:
         cells = [name, found["right_first"]["n"], share_text(found["right_first"])]
         cells += [percent(found[key]) for key in ("exact", "wrong", "extra")]
         keys = ("false_names", "unexplained_clean", "clock_names", "pair")
-        rows.append([*cells, *[_of(found[key]) for key in keys]])
+        rows.append([*cells, *[counted(found[key]) for key in keys]])
     return table(head, rows, True) + "\nBold: held-out worlds.\n"
-
-
-def _of(found: Numbers) -> str:
-    return f"{found['count']} of {found['n']}"
 
 
 def _causes_table(made: Numbers) -> str:
@@ -120,18 +117,21 @@ def _causes_table(made: Numbers) -> str:
     for name, by_group in made["causes"].items():
         every = by_group["all"]
         mistaken = ", ".join(f"`{said}` {n}" for said, n in every["mistaken"].items())
-        shares = [_of(by_group[group]["right_first"]) for group in GROUPS]
-        rows.append([f"`{name}`", *shares, _of(every["exact"]), _of(every["wrong"]), mistaken])
+        shares = [counted(by_group[group]["right_first"]) for group in GROUPS]
+        rows.append(
+            [f"`{name}`", *shares, counted(every["exact"]), counted(every["wrong"]), mistaken]
+        )
     return table(head, rows, True)
 
 
 def _others(made: Numbers) -> str:
     every, ahead, took = made["groups"]["all"], made["next"], made["runtime_s"]
     lines = [
-        f"false alarms, clean rigs: {bound_text(every['false_names'])}; {_named(every['alarms'])}",
+        f"false alarms, clean rigs: {bound_text(every['false_names'])}; "
+        + named_counts(every["alarms"]),
         f"clean rigs called `unexplained`: {share_text(every['unexplained_clean'])}",
         f"wrong names with a clock offset: {bound_text(every['clock_names'])}; "
-        + _named(every["late"]),
+        + named_counts(every["late"]),
         f"pairs with a wrong name: {share_text(every['pair_wrong'])}",
         "untestable effects, another cause named without doubt: "
         + _each(made["untestable"])
@@ -142,24 +142,18 @@ def _others(made: Numbers) -> str:
         f"seconds a diagnosis: median {number(took['median'], '.1f')}, 90 % quantile "
         f"{number(took['q90'], '.1f')}, most {number(took['most'], '.1f')}",
         "effects that did not reach their size on any drawn rig, not diagnosed: "
-        + _named(made["unmade"]),
+        + named_counts(made["unmade"]),
     ]
     return bullets(lines)
 
 
-def _named(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"`{name}` {n}" for name, n in counts.items()) or "none"
-
-
 def _each(shares: Mapping[str, Numbers]) -> str:
-    return ", ".join(f"`{name}` {_of(found)}" for name, found in shares.items()) or "not run"
+    return ", ".join(f"`{name}` {counted(found)}" for name, found in shares.items()) or "not run"
 
 
 def write(records: Sequence[Mapping[str, Any]], folder: Path, arguments: str = "") -> list[Path]:
     """Write ``diagnosis_worlds.md`` and ``diagnosis_worlds.json`` and return their paths."""
     made = figures(records)
-    paths = [folder / f"diagnosis_worlds.{kind}" for kind in ("md", "json")]
-    write_text(paths[0], page(made, arguments))
-    lines = [line(Answer.of(record)) for record in records if not record.get("unmade")]
-    write_record(paths[1], {"schema": 1, "arguments": arguments, "figures": made, "cases": lines})
-    return paths
+    cases = [line(Answer.of(record)) for record in records if not record.get("unmade")]
+    numbers = {"arguments": arguments, "figures": made, "cases": cases}
+    return write_page(folder / "diagnosis_worlds", page(made, arguments), **numbers)
