@@ -22,6 +22,7 @@ from agents.export.recording import record
 from agents.policies.networks import LayersAndInputs, LinearFeatures
 from agents.policies.policy import describe
 from agents.policies.policy_file import CARD, CONTROLLER, INPUT, SCHEMA, check_graph, write_policy
+from agents.vec_envs.gauge import ErrorMean
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.privileged import PrivilegedVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
@@ -73,6 +74,9 @@ def policy_bytes(model: Any, card: Mapping[str, Any]) -> bytes:
     _limits(graph, model.action_space)
     if corrects is not None:
         graph.add("Mul", np.full(1, corrects.scale, np.float32))
+        if corrects.gauge is not None:
+            change = graph.last
+            graph.join("Mul", [change, _factor(graph, corrects.gauge)])
         graph.join("Add", [CONTROLLER, graph.last])
         _limits(graph, corrects.range)
     signals, actions = len(card["signals"]), len(card["action_signals"])
@@ -82,6 +86,30 @@ def policy_bytes(model: Any, card: Mapping[str, Any]) -> bytes:
     check_graph(made)
     data: bytes = made.SerializeToString(deterministic=True)
     return data
+
+
+def _factor(graph: Graph, gauge: ErrorMean) -> str:
+    """Append the arithmetic of :class:`ErrorMean`; return the name of its factor."""
+    count = len(gauge.matrix)
+
+    def followed(before: str, share: np.float32) -> str:
+        """Return ``before + share * (last - before)``, which is kept."""
+        graph.join("Sub", [graph.last, before])
+        graph.add("Mul", np.full(1, share, np.float32))
+        graph.keep(graph.join("Add", [before, graph.last]))
+        return graph.last
+
+    smooth, mean = graph.recall(count), graph.recall(1)
+    graph.last = INPUT
+    graph.add("Gemm", gauge.matrix, transB=1)
+    present = followed(smooth, gauge.smoothing)
+    negative = graph.add("Mul", np.full(1, -1.0, np.float32))
+    graph.join("Max", [present, negative])
+    graph.add("Gemm", np.full((1, count), 1.0 / count, np.float32), transB=1)
+    followed(mean, gauge.averaging)
+    graph.add("Mul", np.full(1, 1.0 / gauge.full, np.float32))
+    graph.add("Max", np.full(1, gauge.least, np.float32))
+    return graph.add("Min", np.ones(1, np.float32))
 
 
 def layer(env: Any, kind: type[L]) -> L | None:

@@ -59,16 +59,23 @@ def input_matrix(network: Network, names: tuple[str, ...]) -> Matrix:
     Its rows are the identity, then ``gain * (a - b)`` for each of ``network.differences``.
     """
     n = len(names)
-    rows = [[1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
-    for difference in network.differences:
-        a, minus, b = difference.partition(" - ")
-        if not minus:
-            raise SettingsError(f"network.differences: {difference!r} must read 'a - b'")
-        row = [0.0] * n
-        row[_index(names, a, "network.differences")] += network.gain
-        row[_index(names, b, "network.differences")] -= network.gain
-        rows.append(row)
-    return tuple(tuple(row) for row in rows)
+    identity = tuple(tuple(1.0 if i == j else 0.0 for j in range(n)) for i in range(n))
+    where, gain = "network.differences", network.gain
+    return (*identity, *(difference(text, names, gain, where) for text in network.differences))
+
+
+def difference(text: str, names: tuple[str, ...], gain: float, where: str) -> tuple[float, ...]:
+    """Return ``gain`` times a difference "a - b" of named inputs, as a row of a matrix.
+
+    A SettingsError, which ``where`` begins, reports another text or an unknown name.
+    """
+    a, minus, b = text.partition(" - ")
+    if not minus:
+        raise SettingsError(f"{where}: {text!r} must read 'a - b'")
+    row = [0.0] * len(names)
+    row[_index(names, a, where)] += gain
+    row[_index(names, b, where)] -= gain
+    return tuple(row)
 
 
 def extended(matrix: Matrix, names: int, hidden: int, first: int) -> Matrix:

@@ -116,6 +116,24 @@ class History:
 
 
 @dataclass(frozen=True)
+class Gauge:
+    """Size of a residual's correction in proportion to the recent error.
+
+    A controller with an exact model errs by less than the exploration noise that other plants
+    need; a correction in proportion to the error leaves it as it is. Each error is smoothed over
+    ``smooth_seconds``, which removes the sensor's noise, and the mean of its absolute values over
+    ``mean_seconds``, as a share of ``full``, multiplies the correction; it is at least ``least``
+    and at most 1.
+    """
+
+    errors: tuple[str, ...] = ()  # "a - b" with names of signals; none for corrections of any size
+    full: float = number(0.05, 1e-6, 2.0)  # mean error, in the signals' range [-1, 1]
+    least: float = number(0.02, 0.0, 1.0)
+    smooth_seconds: float = number(0.1, 0.0, 10.0)
+    mean_seconds: float = number(1.0, 0.0, 100.0)
+
+
+@dataclass(frozen=True)
 class Residual:
     """A policy that corrects a controller: controller's action + ``scale`` * policy, clipped.
 
@@ -126,6 +144,7 @@ class Residual:
 
     controller: str = ""
     scale: float = number(0.1, 1e-4, 1.0)
+    gauge: Gauge = field(default_factory=Gauge)
 
 
 @dataclass(frozen=True)
@@ -154,6 +173,9 @@ class Cost:
     action_rate: float = number(0.0, 0.0, 1e5)
     # cost of each control period that a limit cut off, where the environment has no reward/ended
     ended: float = number(0.0, 0.0, 1e5)
+    # start [s] of each episode without a cost of errors, as on the leaderboard: from there no
+    # controller reaches the reference, and its errors outweigh all later ones
+    settle_seconds: float = number(0.0, 0.0, 1e4)
     # divide by the mean cost of the errors of each kind of rows so far, so that kinds with large
     # errors do not outweigh those with small ones
     relative: bool = False

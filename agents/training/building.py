@@ -10,13 +10,14 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 from agents.export.export import ALGORITHMS, layer
-from agents.policies.networks import kept_inputs, policy_arguments, silence
+from agents.policies.networks import difference, kept_inputs, policy_arguments, silence
 from agents.settings import seeds
 from agents.settings.parts import Cost, Widening
 from agents.settings.presets import ON_POLICY, Config
 from agents.settings.schema import SettingsError
 from agents.vec_envs.batch import make_batch_vec_env, nominal_plant
 from agents.vec_envs.cost import CostVecEnv
+from agents.vec_envs.gauge import ErrorMean, error_mean
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.privileged import PrivilegedVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
@@ -45,7 +46,8 @@ def make_env(config: Config) -> VecEnv:
         env = WideningVecEnv(env, config.widening)
     if corrected:
         made = partial(make_controller, corrected, signals=signals, action_signals=actions)
-        env = ResidualVecEnv(env, corrected, made, scale, controller_plants(config, env))
+        plants, gauge = controller_plants(config, env), _gauge(config, env)
+        env = ResidualVecEnv(env, corrected, made, scale, plants, gauge)
     if config.history.frames:
         past = config.history
         kept = kept_inputs(config, signals, actions)
@@ -63,6 +65,17 @@ def make_env(config: Config) -> VecEnv:
         clip_reward=normalize.clip_reward,
         gamma=config.chosen.gamma,
     )
+
+
+def _gauge(config: Config, env: VecEnv) -> ErrorMean | None:
+    """Return the mean error to which a residual's correction is proportional, if it is."""
+    gauge = config.residual.gauge
+    if not gauge.errors:
+        return None
+    names, where = tuple(signals_of(env)[0].names()), "residual.gauge.errors"
+    matrix = tuple(difference(text, names, 1.0, where) for text in gauge.errors)
+    base: Any = env.unwrapped
+    return error_mean(gauge, matrix, base.batches[0].unwrapped.setup.control_period)
 
 
 def controller_plants(config: Config, env: VecEnv) -> list[Any]:

@@ -61,6 +61,7 @@ class CostVecEnv(VecEnvWrapper):
         observation, _, done, infos = self.venv.step_wait()
         last = self.base.last
         errors = np.sum([self._error_cost(-last[name]) for name in self.errors], axis=0)
+        errors = np.where(last["time"] > self.cost.settle_seconds, errors, 0.0)
         share = self._mean(errors) if self.cost.relative else 1.0
         made = last[EFFORT] - errors / share
         change = (self.action - self.before) / (self.high - self.low)

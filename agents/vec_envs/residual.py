@@ -10,10 +10,13 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from agents.settings.schema import SettingsError
+from agents.vec_envs.gauge import ErrorMean
 
 
 class ResidualVecEnv(VecEnvWrapper):
     """The plant gets ``controller's action + scale * action``, clipped to its range.
+
+    With ``gauge`` the correction is also multiplied by that share of the recent error.
 
     The controller, which ``make`` makes from a nominal plant, runs on all rows at once, with a
     state for each, and its action is appended to the observation; rows on different plants have a
@@ -30,6 +33,7 @@ class ResidualVecEnv(VecEnvWrapper):
         make: Callable[[Any], Any],
         scale: float,
         plants: Sequence[Any] = (),
+        gauge: ErrorMean | None = None,
     ) -> None:
         box, action = venv.observation_space, venv.action_space
         assert isinstance(box, spaces.Box)
@@ -57,6 +61,8 @@ class ResidualVecEnv(VecEnvWrapper):
         self.states: list[Any] = [None] * len(self.controllers)
         self.given = np.zeros((venv.num_envs, width), np.float32)
         self.seen = np.zeros((venv.num_envs, box.shape[0]), np.float32)
+        self.gauge = gauge
+        self.errors = np.zeros((venv.num_envs, gauge.width if gauge else 0), np.float32)
 
     def reset(self) -> NDArray[np.float32]:
         """Start all episodes; see stable-baselines3."""
@@ -67,6 +73,9 @@ class ResidualVecEnv(VecEnvWrapper):
     def _joined(self, observation: NDArray[Any], starts: NDArray[np.bool_]) -> NDArray[np.float32]:
         """Run the controllers and return the observation with their actions."""
         self.seen = observation
+        if self.gauge:
+            self.errors[starts] = 0.0
+            self.errors = self.gauge.after(self.errors, observation)
         for i, (rows, controller) in enumerate(self.controllers):
             self.given[rows], self.states[i] = controller.predict(
                 observation[rows], self.states[i], starts[rows]
@@ -76,6 +85,8 @@ class ResidualVecEnv(VecEnvWrapper):
     def step_async(self, actions: NDArray[Any]) -> None:
         """Apply the correction."""
         change = np.clip(np.asarray(actions, np.float32), np.float32(-1.0), np.float32(1.0))
+        if self.gauge:
+            change = change * self.gauge.factor(self.errors)
         applied = self.given + self.scale * change
         self.venv.step_async(np.clip(applied, self.range.low, self.range.high))
 
@@ -104,12 +115,14 @@ class ResidualVecEnv(VecEnvWrapper):
         return {
             "seen": self.seen.copy(),
             "given": self.given.copy(),
+            "errors": self.errors.copy(),
             "states": [_plain(state) for state in self.states],
         }
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Return to a snapshot."""
         self.seen, self.given = saved["seen"].numpy().copy(), saved["given"].numpy().copy()
+        self.errors = saved["errors"].numpy().copy()
         for i, (rows, controller) in enumerate(self.controllers):
             seen = self.seen[rows]
             _, template = controller.predict(seen, None, np.ones(len(seen), bool))

@@ -26,9 +26,9 @@ from baselines.core.catalogue import make_controller
 Run = Callable[[str], tuple[Any, Path]]
 REMEMBERS = (
     *("recurrent", "plain_recurrent", "history", "residual_sac", "residual_recurrent"),
-    *("strided", "privileged_recurrent"),
+    *("strided", "privileged_recurrent", "residual_in_proportion"),
 )
-CORRECTS = ("residual", "residual_sac", "residual_recurrent")
+CORRECTS = ("residual", "residual_in_proportion", "residual_sac", "residual_recurrent")
 ROOT = Path(__file__).resolve().parents[3]
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from agents.policies.catalogue import CONTROLLERS, load_pretrained
 from agents.policies.emission import Program, policy_model
+from agents.policies.policy import OnnxPolicy
 from benchmarks.exported import run_c
 from pam_envs.arrays import Array
 from pam_envs.export.c import export_c
@@ -26,8 +27,12 @@ PAST = 40
 
 def answers(name: str, steps: int = STEPS) -> tuple[Any, Array, Array]:
     """Return a policy, its inputs under random observations, and its actions."""
-    policy = load_pretrained(name)
-    env: Any = gym.make(CONTROLLERS[name].envs[0]).unwrapped
+    return answers_of(load_pretrained(name), CONTROLLERS[name].envs[0], steps)
+
+
+def answers_of(policy: OnnxPolicy, env_id: str, steps: int = STEPS) -> tuple[Any, Array, Array]:
+    """Return a policy, its inputs under random observations of an environment, and its actions."""
+    env: Any = gym.make(env_id).unwrapped
     random = np.random.default_rng(4)
     n, m = len(policy.signals), len(policy.action_signals)
     observation = env.reset(seed=1)[0]
@@ -51,6 +56,16 @@ def test_thousand_actions_in_c_are_those_of_onnxruntime(name: str, tmp_path: Pat
     found = run_c(model, tmp_path, inputs)
     assert np.abs(found - actions).max() <= LARGEST
     assert np.ptp(actions) > 0.5
+
+
+def test_correction_in_proportion_to_the_error_in_c(short_run: Any, tmp_path: Path) -> None:
+    trained = OnnxPolicy.load(short_run("residual_in_proportion")[1] / "policy.onnx")
+    policy, inputs, actions = answers_of(trained, str(trained.card["env"]), 200)
+    model = policy_model("proportional", policy, 0.01)
+    export_c(model, tmp_path, [host_platform()])
+    assert np.abs(run_c(model, tmp_path, inputs) - actions).max() <= LARGEST
+    correction = np.abs(actions - inputs[:, len(policy.signals) :])
+    assert correction.max() > 100.0 * LARGEST
 
 
 def test_first_step_begins_an_episode(tmp_path: Path) -> None:

@@ -50,6 +50,17 @@ def test_errors_cost_their_square_up_to_the_limit_and_linearly_beyond():
     assert rewards == pytest.approx(terms["reward/effort"] - expected, rel=1e-6)
 
 
+def test_errors_before_the_settled_time_cost_nothing():
+    terms, rewards, _, starts = terms_and_rewards(Cost(settle_seconds=0.1))
+    steps = np.zeros(N, int)
+    for row, (reward, start) in enumerate(zip(rewards, starts, strict=True)):
+        steps = np.where(start, 1, steps + 1)
+        counted = steps > 10
+        expected = terms["reward/effort"][row] + np.where(counted, terms["reward/tracking"][row], 0)
+        assert reward == pytest.approx(expected, rel=1e-5)
+    assert (rewards < 0.0).any()
+
+
 def test_changes_of_the_action_cost_their_square_within_an_episode():
     terms, rewards, actions, starts = terms_and_rewards(Cost(action_rate=3.0))
     plain = sum(terms.values())
