@@ -18,9 +18,10 @@ The torque of a gait's plan is that of the wearer but for a difference, which is
 The tension that gives it depends on the angle, which is the plan's, moved by the deviation of the
 wearer's knee under the assistance (:mod:`baselines.knee.wearer`) and by a filtered difference.
 
-With feedback, a PI compares the sensed tension with that of the nominal muscle under the same
-commands at the sensed angle, one dead time late. With an exact model it is at rest: it starts at
-zero and does not counteract the anticipation.
+The adaptive form also estimates the regulator, as the best of a bank of models, and the gain of the
+muscle, as the ratio of the mean products of sensed and nominal tension over a fading memory. With
+an exact model both keep their nominal values. Without it, measurements still correct the phase, the
+wearer's deviation and the planned torque, but not the tension itself.
 """
 
 import math

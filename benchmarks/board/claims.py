@@ -87,7 +87,7 @@ def claim(row: Row, rival: Row, doubts: Sequence[str] = ()) -> Claim | None:
     split, probability = views.common_split(row, rival), standings.improvement(row, rival)
     if split is None or probability is None:
         return None
-    ratios, gained = cost_ratios(row, rival, split), gain(row, rival, split)
+    ratios, gained = cost_ratios(row, rival, split), gain(row, rival)
     against = [*_doubts(row, rival, probability, gained, split), *doubts]
     costs = [f"{name} {ratio:.2f}x" for name, ratio in ratios.items() if not ratio <= COST_RATIO]
     verdict = NOT_SHOWN if against else DEARER if costs else BETTER
@@ -97,12 +97,9 @@ def claim(row: Row, rival: Row, doubts: Sequence[str] = ()) -> Claim | None:
     )
 
 
-def gain(row: Row, rival: Row, split: str) -> Interval:
+def gain(row: Row, rival: Row) -> Interval:
     """Return the relative reduction of the mean against the rival."""
-    more, whole = standings.difference(row, rival), views.mean_of(rival, split=split)
-    if more is None or not whole > 0.0:
-        return NOTHING
-    return Interval(-more.value / whole, -more.high / whole, -more.low / whole)
+    return standings.reduction(row, rival) or NOTHING
 
 
 def _budgets(row: Row, rival: Row) -> tuple[str, ...]:

@@ -28,9 +28,11 @@ def number(value: float | None) -> str:
 
 
 def bounded(interval: Interval | None, factor: float = 1.0) -> str:
-    """Return a number with its interval behind it, or a dash."""
+    """Return a number with its interval behind it, without one that is unknown, or a dash."""
     if interval is None or not np.isfinite(interval.value):
         return "-"
+    if not np.isfinite(interval.low):
+        return number(factor * interval.value)
     bounds = f"[{number(factor * interval.low)}, {number(factor * interval.high)}]"
     return f"{number(factor * interval.value)} {bounds}"
 
@@ -53,8 +55,13 @@ def chance(interval: Interval | None) -> str:
 
 def percent(interval: Interval) -> str:
     """Return a share with its interval in percent, signs and all."""
-    value, low, high = (f"{100.0 * x:+.2g}" for x in (interval.value, interval.low, interval.high))
-    return f"{value} % [{low}, {high}]"
+    value, low, high = map(_percent, (interval.value, interval.low, interval.high))
+    return f"{value} % [{low}, {high}]" if np.isfinite(interval.low) else f"{value} %"
+
+
+def _percent(share: float) -> str:
+    size = 100.0 * share
+    return f"{size:+.0f}" if abs(size) >= 9.95 else f"{size:+.2g}"
 
 
 def duration(seconds: float | None) -> str:

@@ -107,6 +107,11 @@ def difference(first: Row, second: Row) -> Interval | None:
     return _compared(statistics.difference_of_tables, first, second)
 
 
+def reduction(first: Row, second: Row) -> Interval | None:
+    """Return by what share the mean headline of ``first`` is lower, paired by episode."""
+    return _compared(statistics.reduction_of_tables, first, second)
+
+
 def improvement(first: Row, second: Row) -> Interval | None:
     """Return the probability that ``first`` has the lower headline, by paired episodes."""
     return _compared(statistics.probability_of_improvement, first, second)

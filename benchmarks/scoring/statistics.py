@@ -163,6 +163,25 @@ def difference_of_tables(first: Array, second: Array, strata: ArrayLike) -> Inte
     return between(float(np.mean(first.mean(axis=0) - second.mean(axis=0))), drawn)
 
 
+def reduction_of_tables(first: Array, second: Array, strata: ArrayLike) -> Interval:
+    """Return ``1 - mean(first) / mean(second)`` with its interval, paired by episode.
+
+    Both means are of the same resampled episodes; NaN throughout if a mean of ``second`` is not
+    positive.
+    """
+    columns = resample_indices(strata, RESAMPLES, BOOTSTRAP_SEED)
+    means = []
+    for number, table in enumerate((first, second)):
+        drawn = _run_counts(table, RESAMPLES, number) if len(table) > 1 else np.ones((1, 1))
+        averages = np.einsum("rt,tk->rk", drawn / drawn[0].sum(), table)
+        rows = np.broadcast_to(averages, (RESAMPLES, table.shape[1]))
+        means.append(np.take_along_axis(rows, columns, axis=1).mean(axis=1))
+    whole = float(second.mean())
+    if not (whole > 0.0 and (means[1] > 0.0).all()):
+        return NOTHING
+    return between(1.0 - float(first.mean()) / whole, 1.0 - means[0] / means[1])
+
+
 def difference_of_splits(
     first: Array, first_strata: ArrayLike, second: Array, second_strata: ArrayLike
 ) -> Interval:

@@ -82,6 +82,20 @@ def test_interval_covers_the_share_of_each_half_of_the_episodes():
     assert found.errors["oracle"].low < found.errors["oracle"].value
 
 
+def test_one_episode_of_a_scenario_gives_no_interval():
+    made = track()
+    bounds = oracle(made[0], 0.25)
+    first = {episode.scenario: episode for episode in reversed(bounds.episodes)}
+    few = oracle(made[0], 0.25, episodes=tuple(first.values()))
+    found = gap.gap_of_best(made, few)
+    assert found is not None
+    assert found.closed.value == pytest.approx(2.0 / 3.0)
+    assert np.isnan(found.closed.low)
+    page = gap.page_text({"fake_nominal": made}, {"fake_nominal": few})
+    assert "+67 % |" in page
+    assert "0.500 mm |" in page
+
+
 def test_bounds_of_another_task_give_no_share():
     made = track()
     assert gap.gap_of_best(made, oracle(made[0], 0.25, task="other")) is None

@@ -182,3 +182,20 @@ def test_profile_band_uses_the_resamples_of_the_mean():
     assert (low[0], high[0], low[2], high[2]) == (0.0, 0.0, 1.0, 1.0)
     share = statistics.of_table((scores <= 0.0).astype(float), strata, resamples=300)
     assert (low[1], high[1]) == (pytest.approx(share.low), pytest.approx(share.high))
+
+
+def test_reduction_is_of_means_over_the_same_resamples():
+    """A constant ratio has an interval of no width, however much the episodes differ."""
+    theirs = np.array([[1.0, 5.0, 2.0, 30.0, 0.1, 7.0]])
+    strata = list("aaabbb")
+    found = statistics.reduction_of_tables(0.25 * theirs, theirs, strata)
+    assert [found.value, found.low, found.high] == pytest.approx([0.75, 0.75, 0.75])
+    random = np.random.default_rng(0)
+    ours = theirs * random.uniform(0.05, 0.9, theirs.shape)
+    found = statistics.reduction_of_tables(ours, theirs, strata)
+    assert found.value == pytest.approx(1.0 - ours.mean() / theirs.mean())
+    assert found.low < found.value < found.high < 1.0
+    several = statistics.reduction_of_tables(np.vstack([ours, 0.9 * ours]), theirs, strata)
+    assert several.value == pytest.approx(1.0 - 0.95 * ours.mean() / theirs.mean())
+    assert several.low < several.value < several.high < 1.0
+    assert np.isnan(statistics.reduction_of_tables(ours, 0.0 * theirs, strata).value)
