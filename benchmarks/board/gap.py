@@ -310,4 +310,5 @@ def _gains(tracks: Mapping[str, Track]) -> list[str]:
         for kind, held in counts.items()
         if held
     )
-    return [*tables(heading, lines), "", f"Better on {words}."] if lines else ["None has run."]
+    counted = ["", f"Better on {words}."] if words else []
+    return [*tables(heading, lines), *counted] if lines else ["None has run."]
