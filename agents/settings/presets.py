@@ -44,7 +44,10 @@ OPTIONAL = (
     *("privileged", "adaptation", "evaluation", "search"),
 )
 """Parts that the plain form omits where they equal their defaults."""
-LATER = (("history", "stride"), ("cost", "relative"))
+LATER = (
+    *(("history", "stride"), ("cost", "relative")),
+    *(("cost", "settle_seconds"), ("residual", "gauge")),
+)
 """The same of settings within parts: files from before have none of them."""
 NAME = re.compile(r"[A-Za-z0-9]+-v[0-9]+\.[a-z_]+(-[a-z_]+)?")
 ENV = re.compile(r"PAM/[A-Za-z0-9]+-v[0-9]+")
@@ -205,9 +208,10 @@ class Config:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, without other algorithms' parts and optional default parts."""
-        plain, default = _plain(dataclasses.asdict(self)), Config(self.env)
+        default = Config(self.env)
+        plain, usual = (_plain(dataclasses.asdict(config)) for config in (self, default))
         for part, name in LATER:
-            if plain[part][name] == getattr(getattr(default, part), name):
+            if plain[part][name] == usual[part][name]:
                 del plain[part][name]
         omitted = [a for a in ALGORITHMS if a != self.algo]
         omitted += [name for name in OPTIONAL if getattr(self, name) == getattr(default, name)]
