@@ -74,8 +74,7 @@ def _gauge(config: Config, env: VecEnv) -> ErrorMean | None:
         return None
     names, where = tuple(signals_of(env)[0].names()), "residual.gauge.errors"
     matrix = tuple(difference(text, names, 1.0, where) for text in gauge.errors)
-    base: Any = env.unwrapped
-    return error_mean(gauge, matrix, base.batches[0].unwrapped.setup.control_period)
+    return error_mean(gauge, matrix, env.get_attr("control_period")[0])
 
 
 def controller_plants(config: Config, env: VecEnv) -> list[Any]:

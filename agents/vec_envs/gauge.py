@@ -4,12 +4,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from agents.settings.parts import Gauge
 
 Array = NDArray[np.float32]
-Matrix = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class ErrorMean:
         return np.clip(state[:, -1:] / self.full, self.least, np.float32(1.0))
 
 
-def error_mean(gauge: Gauge, matrix: Matrix, period: float) -> ErrorMean:
+def error_mean(gauge: Gauge, matrix: ArrayLike, period: float) -> ErrorMean:
     """Return the mean of a gauge for a control period [s]; ``matrix`` maps signals to errors."""
 
     def share(seconds: float) -> np.float32:

@@ -102,13 +102,18 @@ def gain(row: Row, rival: Row) -> Interval:
     return standings.reduction(row, rival) or NOTHING
 
 
+def tried(row: Row) -> str:
+    """Return the number of settings tried, in words."""
+    trials = views.cost_of(row).trials
+    return "by hand" if trials is None else str(trials)
+
+
 def _budgets(row: Row, rival: Row) -> tuple[str, ...]:
     """Return a remark if the numbers of settings tried differ."""
-    mine, theirs = (views.cost_of(each).trials for each in (row, rival))
+    mine, theirs = tried(row), tried(rival)
     if mine == theirs:
         return ()
-    words = ["by hand" if count is None else str(count) for count in (mine, theirs)]
-    return (f"settings tried: {words[0]}, {words[1]} for {views.name_of(rival)}",)
+    return (f"settings tried: {mine}, {theirs} for {views.name_of(rival)}",)
 
 
 def _doubts(row: Row, rival: Row, probability: Interval, gained: Interval, split: str) -> list[str]:

@@ -268,11 +268,6 @@ def gain(rows: Sequence[Row], matched: bool = False) -> Gain | None:
     return Gain(row, rival, share, claims.gain(row, rival))
 
 
-def _tried(row: Row) -> str:
-    trials = views.cost_of(row).trials
-    return "by hand" if trials is None else str(trials)
-
-
 def _gains(tracks: Mapping[str, Track]) -> list[str]:
     heading = ["track", "controller", "RMS", "best other", "its RMS", "lower by", "P", "result"]
     heading += ["tried", "matched", "lower by than matched"]
@@ -290,7 +285,7 @@ def _gains(tracks: Mapping[str, Track]) -> list[str]:
             cells += [f"`{views.name_of(row)}`", f"{mean} {unit}"]
         cells += [percent(found.lower_by), chance(found.probability)]
         cells.append("**better**" if found.holds else "not shown")
-        cells.append(", ".join(_tried(row) for row in (found.row, found.rival)))
+        cells.append(f"{claims.tried(found.row)}, {claims.tried(found.rival)}")
         cells += (
             ["-", "-"]
             if same is None

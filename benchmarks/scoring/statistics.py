@@ -150,16 +150,22 @@ def _run_counts(table: Array, resamples: int, number: int = 0) -> Array:
     return counts(resample_indices(np.zeros(len(table)), resamples, seed), len(table))
 
 
+def _averages_of_runs(*tables: Array) -> list[Array]:
+    """Return each episode's average over resampled runs of each table, shape (RESAMPLES, n)."""
+    averages = []
+    for number, table in enumerate(tables):
+        drawn = _run_counts(table, RESAMPLES, number)
+        averages.append(np.einsum("rt,tk->rk", drawn / drawn[0].sum(), table))
+    return averages
+
+
 def difference_of_tables(first: Array, second: Array, strata: ArrayLike) -> Interval:
     """Return the mean of ``first - second`` with its interval, paired by episode."""
     if len(first) == len(second) == 1:
         return of_table(first - second, strata)
     columns = resample_indices(strata, RESAMPLES, BOOTSTRAP_SEED)
-    averages = []
-    for number, table in enumerate((first, second)):
-        drawn = _run_counts(table, RESAMPLES, number)
-        averages.append(np.einsum("rt,tk->rk", drawn / drawn[0].sum(), table))
-    drawn = np.take_along_axis(averages[0] - averages[1], columns, axis=1).mean(axis=1)
+    ours, theirs = _averages_of_runs(first, second)
+    drawn = np.take_along_axis(ours - theirs, columns, axis=1).mean(axis=1)
     return between(float(np.mean(first.mean(axis=0) - second.mean(axis=0))), drawn)
 
 
@@ -170,16 +176,14 @@ def reduction_of_tables(first: Array, second: Array, strata: ArrayLike) -> Inter
     positive.
     """
     columns = resample_indices(strata, RESAMPLES, BOOTSTRAP_SEED)
-    means = []
-    for number, table in enumerate((first, second)):
-        drawn = _run_counts(table, RESAMPLES, number) if len(table) > 1 else np.ones((1, 1))
-        averages = np.einsum("rt,tk->rk", drawn / drawn[0].sum(), table)
-        rows = np.broadcast_to(averages, (RESAMPLES, table.shape[1]))
-        means.append(np.take_along_axis(rows, columns, axis=1).mean(axis=1))
+    ours, theirs = (
+        np.take_along_axis(averages, columns, axis=1).mean(axis=1)
+        for averages in _averages_of_runs(first, second)
+    )
     whole = float(second.mean())
-    if not (whole > 0.0 and (means[1] > 0.0).all()):
+    if not (whole > 0.0 and (theirs > 0.0).all()):
         return NOTHING
-    return between(1.0 - float(first.mean()) / whole, 1.0 - means[0] / means[1])
+    return between(1.0 - float(first.mean()) / whole, 1.0 - ours / theirs)
 
 
 def difference_of_splits(

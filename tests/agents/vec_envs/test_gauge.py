@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from short_runs import kind
 
+from agents.export.export import layer as wrapper
 from agents.settings.parts import Gauge
 from agents.settings.schema import SettingsError
 from agents.training.building import make_env
@@ -57,16 +58,9 @@ def test_several_errors_count_by_their_mean():
     assert followed(gauge, errors)[-1] == pytest.approx(0.4, rel=1e-3)
 
 
-def layer_of(env: Any) -> ResidualVecEnv:
-    """Return the residual's wrapper."""
-    while not isinstance(env, ResidualVecEnv):
-        env = env.venv
-    return env
-
-
 def test_environment_scales_the_correction_and_starts_each_episode_at_the_least():
     env = make_env(kind("residual_in_proportion"))
-    layer = layer_of(env)
+    layer: Any = wrapper(env, ResidualVecEnv)
     sent: list[Any] = []
     send = layer.venv.step_async
     layer.venv.step_async = lambda actions: (sent.append(np.array(actions)), send(actions))[1]
