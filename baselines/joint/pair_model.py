@@ -102,9 +102,9 @@ def pull_rows(
 @entry
 def friction_rows(
     table: Array, numbers: Array, thresholds: Array, curves: Array, low: float, per: float,
-    angles: Array, pressures: Array, sliders: Array, torques: Array,
+    angles: Array, pressures: Array, sliders: Array, drags: Array,
 ) -> None:  # fmt: skip
-    """Write the torques of friction [N m] at successive angles [rad], shape (rows, n).
+    """Write the frictions [N] of both muscles at successive angles [rad], shape (rows, n, 2).
 
     The sliders, shape (rows, 2, elements), are changed in place to those at the last angle.
     """
@@ -112,13 +112,10 @@ def friction_rows(
     for r in range(len(angles)):
         for k in range(angles.shape[1]):
             cell, share = cell_at(table, numbers, angles[r, k])
-            torque = 0.0
             for side in range(2):
-                drag, _ = friction_of(
+                drags[r, k, side], _ = friction_of(
                     table, numbers, slip, cell, share, side, pressures[r, side], sliders[r, side]
                 )
-                torque = torque + drag * looked_up(table, cell, share, LEVER + side)
-            torques[r, k] = torque
 
 
 @kernel
@@ -130,11 +127,11 @@ def share_of(value: float, least: float, most: float) -> float:
 
 
 @kernel
-def torque_under(table: Any, cell: int, share: float, both: Any, k: int) -> float:
-    """Return the torque [N m] without friction at setpoint ``k``."""
+def torque_under(table: Any, cell: int, share: float, both: Any, k: int, drag: Any) -> float:
+    """Return the torque [N m] at setpoint ``k`` under the frictions [N] of the muscles, (2,)."""
     torque = 0.0
     for side in range(2):
-        force = max(0.0, force_of(table, cell, share, side, both[side, k]))
+        force = max(0.0, force_of(table, cell, share, side, both[side, k]) - drag[side])
         torque = torque - force * looked_up(table, cell, share, LEVER + side)
     return torque
 
@@ -142,17 +139,20 @@ def torque_under(table: Any, cell: int, share: float, both: Any, k: int) -> floa
 @entry
 def set_point_rows(
     table: Array, numbers: Array, set_points: Array, both: Array, angle: Array, torque: Array,
-    found: Array,
+    drag: Array, found: Array,
 ) -> None:  # fmt: skip
-    """Write the setpoints [rad] at which the muscles exert torques [N m] at angles [rad]."""
+    """Write the setpoints [rad] at which the muscles exert torques [N m] at angles [rad].
+
+    ``drag`` [N] has the shape (rows, 2).
+    """
     for r in range(len(angle)):
         cell, share = cell_at(table, numbers, angle[r])
         low, high = 0, len(set_points) - 1
-        least = torque_under(table, cell, share, both, low)
-        most = torque_under(table, cell, share, both, high)
+        least = torque_under(table, cell, share, both, low, drag[r])
+        most = torque_under(table, cell, share, both, high, drag[r])
         while high - low > 1:
             middle = (low + high) // 2
-            there = torque_under(table, cell, share, both, middle)
+            there = torque_under(table, cell, share, both, middle, drag[r])
             if there < torque[r]:
                 low, least = middle, there
             else:
@@ -290,21 +290,26 @@ class PairModel:
         return Pull(*found), after
 
     def friction(self, angles: Array, pressures: Array, sliders: Array) -> tuple[Array, Array]:
-        """Return the torques of friction [N m] at successive angles, (rows, n), and the sliders."""
-        given, after = np.ascontiguousarray(angles), sliders.copy()
-        torques = np.empty_like(given)
-        friction_rows(*self._tables, given, np.ascontiguousarray(pressures), after, torques)
-        return torques, after
+        """Return the frictions [N] of both muscles at successive angles, and the sliders.
 
-    def set_point(self, angle: Array, torque: Array) -> Array:
+        Angles have the shape (rows, n), frictions (rows, n, 2).
+        """
+        given, after = np.ascontiguousarray(angles), sliders.copy()
+        drags = np.empty((*given.shape, 2))
+        friction_rows(*self._tables, given, np.ascontiguousarray(pressures), after, drags)
+        return drags, after
+
+    def set_point(self, angle: Array, torque: Array, drag: Array) -> Array:
         """Return the setpoints [rad] at which the muscles exert torques [N m] at angles [rad].
 
-        The arrays may have any shape. Friction is neglected. If a torque is out of reach, the
+        Angles and torques may have any shape; frictions ``drag`` [N] have one axis more, of length
+        2. A slack muscle exerts neither force nor friction. If a torque is out of reach, the
         setpoint is the end of its range.
         """
         found = np.empty(angle.size)
         given = (np.ascontiguousarray(angle).ravel(), np.ascontiguousarray(torque).ravel())
-        set_point_rows(*self._tables[:2], *self._set_points, *given, found)
+        pairs = np.ascontiguousarray(drag).reshape(-1, 2)
+        set_point_rows(*self._tables[:2], *self._set_points, *given, pairs, found)
         return found.reshape(angle.shape)
 
     # --- nominal point --------------------------------------------------------------------------

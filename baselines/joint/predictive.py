@@ -85,7 +85,7 @@ COMPENSATION_DAMPING = 0.02
 """Damping of the least squares [m/rad]."""
 GRADIENT = 1e-4
 """Step of the angle [rad] with which the stiffness due to the weight is computed."""
-KNOBS: Bounds = {"lead": (0.1, 4.0), "observer": (0.03, 10.0), "feedback": (0.1, 6.0)}
+KNOBS: Bounds = {"lead": (0.1, 4.0), "observer": (0.03, 10.0), "feedback": (0.1, 10.0)}
 """Factors on the lead, on the random steps for which the observer is designed, and on the weight of
 an angle error in the linear-quadratic regulator."""
 
@@ -367,18 +367,17 @@ class JointPredictive(RowController):
         """Return the setpoints [rad] at which the muscles exert the torques of a demand."""
         shape, model = demand.angle.shape, self.model
         flat = demand.angle.reshape(-1, shape[2])
-        rubs, _ = model.friction(flat, then.pressure.reshape(-1, 2), _flat(then.sliders))
+        drag, _ = model.friction(flat, then.pressure.reshape(-1, 2), _flat(then.sliders))
         nodes = np.moveaxis(demand.angle, 2, 1)
         payload = np.repeat(view.payload, shape[2])
         weight = self.gravity.torque(nodes.reshape(-1, shape[1]), payload).reshape(nodes.shape)
-        torque = np.moveaxis(weight, 1, 2) - rubs.reshape(shape)
-        torque = torque + (demand.feedback - then.disturbance)[..., None]
+        torque = np.moveaxis(weight, 1, 2) + (demand.feedback - then.disturbance)[..., None]
         damping = self.motion.damping + model.damping - self.lead * model.stiffness
         torque = torque + damping[:, None] * demand.rate
         pushed = self._masses(view.payload)[..., None] * demand.acceleration[:, None]
         torque = torque + np.add.reduce(pushed, axis=2)
         bend = 0.5 * self.lead**2 * demand.acceleration
-        static = self.model.set_point(demand.angle, torque) - demand.angle
+        static = model.set_point(demand.angle, torque, drag.reshape(*shape, 2)) - demand.angle
         return demand.led - bend + static
 
     def _shortfall(self, view: JointView, now: PredictiveState) -> Array:

@@ -60,10 +60,23 @@ def test_setpoint_exerts_the_torque_at_an_angle():
     plant = STOCK.replace({"muscle.gain": 1.1, "muscle.imbalance": 0.05})
     model, angle = PairModel(plant), np.array([-0.3, 0.0, 0.2])
     torque = np.array([1.0, -0.5, 0.8])
-    found = model.pressures(model.set_point(angle, torque))
+    free = np.zeros((3, 2))
+    found = model.pressures(model.set_point(angle, torque, free))
     np.testing.assert_allclose(plant.torque(angle, *found.T), torque, atol=2e-3)
-    far = model.set_point(angle, np.array([90.0, -90.0, 90.0]))
+    far = model.set_point(angle, np.array([90.0, -90.0, 90.0]), free)
     np.testing.assert_array_equal(far, STOCK.angle_range[1] * np.array([1.0, -1.0, 1.0]))
+
+
+def test_setpoint_counts_neither_force_nor_friction_of_a_slack_muscle():
+    plant = AntagonisticJoint.paper("maxwell_slip_length")
+    model, angle = PairModel(plant), np.radians([27.5])
+    pressures = model.pressures(np.radians([26.5]))
+    drag = np.array([[12.0, -4.0]])  # N; muscle a exerts less than 12 N at this angle
+    law = plant.muscle.law(pressures[0], plant.lever.contraction(angle[0], plant.muscle.rest_length))
+    assert 0.0 < law[0] < drag[0, 0]
+    lever = plant.lever.rate(angle[0])
+    torque = -np.sum(np.maximum(law - drag[0], 0.0) * lever)
+    assert model.set_point(angle, np.array([torque]), drag) == pytest.approx(np.radians(26.5), abs=1e-3)
 
 
 def test_command_leads_to_the_difference_of_both_pressures():
