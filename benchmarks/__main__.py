@@ -365,6 +365,7 @@ def bound(
     track: Positional[tuple[str, ...]],
     episodes: int = 2,
     horizon: int = 100,
+    start: str = "",
     write: bool = False,
 ) -> int:
     """Estimate the smallest error of tracks: a controller that knows plant, state and future.
@@ -373,13 +374,15 @@ def bound(
         track: Names of scenario files.
         episodes: Number of episodes of each scenario, its first public ones.
         horizon: Control periods that are predicted.
+        start: Controller whose actions in the same episodes the search starts from.
         write: Write the result into benchmarks/results/oracle.json.xz, which the board reads.
     """
     from benchmarks.bounds import run as bounding
 
     for chosen in _choose(track, scenarios.available(), "track"):
-        with progress("scenarios") as start:
-            found = bounding.bounds_of(chosen, episodes, horizon, start(len(chosen.scenarios())))
+        with progress("scenarios") as begin:
+            advance = begin(len(chosen.scenarios()))
+            found = bounding.bounds_of(chosen, episodes, horizon, start, advance)
         print(bounding.table(chosen, found), flush=True)
         if write:
             bounding.write({chosen.name: found})

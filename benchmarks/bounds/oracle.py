@@ -15,7 +15,9 @@ blocking). Sensitivities are finite differences: one copy per unknown, its actio
 one period on. The differences are large and their sign alternates, since the thresholds of a
 hysteresis, a rate limit or the end of the range hide a small change or one direction. A step is the
 best of several lengths and dampings, so that the predicted cost never increases. The last plan,
-shifted, is the next starting point.
+shifted, is the next starting point. The actions of a controller in the same episode, if they are
+given, extend it, and replace it where they cost less: Gauss-Newton alone can stay in a local
+minimum that is worse than that controller.
 
 Errors that are not scored (outside of the gate of a track, before it has settled) have the weight
 ``UNSCORED``: just enough to keep the plant in its usual range. With a larger weight the oracle
@@ -104,6 +106,8 @@ class Oracle:
         Time [s] from which the error is scored.
     horizon : int
         Control periods.
+    given : ndarray, shape (n, rows, n_act), optional
+        Actions of a controller in the same episodes.
     """
 
     env: PlantVectorEnv
@@ -112,6 +116,7 @@ class Oracle:
     gate: Sequence[str] = ()
     settle: float = 0.0
     horizon: int = 60
+    given: Array | None = None
 
     def __post_init__(self) -> None:
         """Make the copies; the first plan holds the setpoints of the start."""
@@ -122,7 +127,8 @@ class Oracle:
         raised = np.arange(self.horizon) >= self._blocks[:, None]
         self._raises = np.kron(raised.astype(float), np.eye(self.width))
         self._tangent = Copies(self.env, len(self._raises) + 1)
-        self._trial = Copies(self.env, len(DAMPINGS) * len(LENGTHS) + 1)
+        candidates = len(DAMPINGS) * len(LENGTHS) + 1 + (self.given is not None)
+        self._trial = Copies(self.env, candidates)
         self.start(np.zeros((self.env.num_envs, self.width)))
 
     @property
@@ -144,8 +150,15 @@ class Oracle:
         self._periods += 1
         action = self.plan[0].copy()
         self.last = action
-        self.plan = np.concatenate([self.plan[1:], self.plan[-1:]])
+        more = self.plan[-1:] if self.given is None else self._given_ahead()[-1:]
+        self.plan = np.concatenate([self.plan[1:], more])
         return action
+
+    def _given_ahead(self) -> Array:
+        """Return the given actions of the horizon, shape (horizon, rows, n_act)."""
+        assert self.given is not None
+        periods = self._periods + np.arange(self.horizon)
+        return self.given[np.minimum(periods, len(self.given) - 1)]
 
     def _improve(self, difference: float) -> None:
         base, slopes = self._linearised(difference)
@@ -179,6 +192,8 @@ class Oracle:
     def _search(self, steps: Array) -> None:
         """Take the best of several lengths of steps, shape (horizon, rows, dampings, n_act)."""
         moves = [length * steps for length in LENGTHS] + [np.zeros_like(steps[:, :, :1])]
+        if self.given is not None:
+            moves.append((self._given_ahead() - self.plan)[:, :, None])
         trials = np.clip(self.plan[:, :, None] + np.concatenate(moves, axis=2), -1.0, 1.0)
         self._trial.take(self.env)
         costs = np.sum(self._errors(self._trial.run(trials)) ** 2, axis=-1)

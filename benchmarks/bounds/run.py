@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 from filelock import FileLock
 
+from baselines.core.catalogue import make_controller
 from benchmarks.bounds.oracle import Oracle, targets_of
 from benchmarks.identity import tasks
+from benchmarks.runs import rollout
 from benchmarks.runs.rollout import Episode
 from benchmarks.runs.rows import RESULTS
 from benchmarks.runs.store import read_record, write_record
 from benchmarks.scenarios.scenario import Scenario, ScenarioSet
-from benchmarks.scenarios.scenario_env import make_batch
+from benchmarks.scenarios.scenario_env import make_batch, make_env, model_of
 from benchmarks.scoring.metrics import COSTS, headline_of, headlines_of, of_track, scores_of, shown
 from pam_envs.arrays import Array
 
@@ -53,20 +55,27 @@ class Bounds:
         Control periods that the oracle predicts.
     episodes : sequence of Bound
         Those of all scenarios.
+    start : str
+        Controller whose actions the search starts from; empty for none.
     """
 
     task: str
     horizon: int
     episodes: Sequence[Bound]
+    start: str = ""
 
 
 def bounds_of(
     track: ScenarioSet,
     episodes: int = EPISODES,
     horizon: int = HORIZON,
+    start: str = "",
     advance: Callable[[], None] = lambda: None,
 ) -> Bounds:
-    """Return the bounds of a track on the first public episodes of every scenario."""
+    """Return the bounds of a track on the first public episodes of every scenario.
+
+    ``start`` is the controller of the catalogue whose actions the search starts from.
+    """
     most = track.content["seeds"]
     if not 1 <= episodes <= most:
         raise ValueError(
@@ -76,12 +85,13 @@ def bounds_of(
     found = []
     for scenario in track.scenarios():
         seeds = track.seeds[scenario.name][:episodes]
-        for seed, episode in zip(seeds, play(track, scenario, seeds, horizon), strict=True):
+        played = play(track, scenario, seeds, horizon, start)
+        for seed, episode in zip(seeds, played, strict=True):
             scores = scores_of(episode, track.content, scenario.rests)
             kept = {name: scores[name] for name in metrics_of(track.content)}
             found.append(Bound(scenario.name, seed, episode.failed, kept))
         advance()
-    return Bounds(tasks.of(track).identity.digest, horizon, tuple(found))
+    return Bounds(tasks.of(track).identity.digest, horizon, tuple(found), start)
 
 
 def metrics_of(content: Mapping[str, Any]) -> tuple[str, ...]:
@@ -92,7 +102,7 @@ def metrics_of(content: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def play(
-    track: ScenarioSet, scenario: Scenario, seeds: tuple[int, ...], horizon: int
+    track: ScenarioSet, scenario: Scenario, seeds: tuple[int, ...], horizon: int, start: str = ""
 ) -> list[Episode]:
     """Return the episodes of the oracle as rows of a batch."""
     env, content = make_batch(track.env, scenario.kwargs, len(seeds)), track.content
@@ -104,6 +114,7 @@ def play(
         tuple(content.get("gate") or ()),
         float(content["settle_seconds"]),
         horizon,
+        _actions_of(start, track, scenario, seeds) if start else None,
     )
     oracle.start(_held(env, observation))
     infos, actions = [], []
@@ -135,6 +146,19 @@ def play(
     ]
 
 
+def _actions_of(
+    controller: str, track: ScenarioSet, scenario: Scenario, seeds: tuple[int, ...]
+) -> Array:
+    """Return a controller's actions, shape (n, rows, n_act); a shorter episode ends with zeros."""
+    env = make_env(track.env, scenario.kwargs)
+    model, base = model_of(track.env, scenario, env), env.unwrapped
+    made = make_controller(controller, model, base.signals, base.action_signals)
+    episodes = [rollout.run(env, made, seed).actions for seed in seeds]
+    longest = max(map(len, episodes))
+    padded = [np.pad(one, ((0, longest - len(one)), (0, 0))) for one in episodes]
+    return np.stack(padded, axis=1).astype(float)
+
+
 def _held(env: object, observation: Array) -> Array:
     """Return the actions that hold the setpoints of the start, 0 where they are not observed."""
     signals = env.signals  # type: ignore[attr-defined]
@@ -158,7 +182,7 @@ def read(folder: Path = RESULTS) -> dict[str, Bounds]:
             "-m benchmarks bound TRACK --write`"
         )
     return {
-        name: Bounds(one["task"], one["horizon"], tuple(Bound(**e) for e in one["episodes"]))
+        name: Bounds(**one | {"episodes": tuple(Bound(**e) for e in one["episodes"])})
         for name, one in record["tracks"].items()
     }
 

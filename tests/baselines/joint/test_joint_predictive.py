@@ -72,11 +72,13 @@ def test_setpoint_counts_neither_force_nor_friction_of_a_slack_muscle():
     model, angle = PairModel(plant), np.radians([27.5])
     pressures = model.pressures(np.radians([26.5]))
     drag = np.array([[12.0, -4.0]])  # N; muscle a exerts less than 12 N at this angle
-    law = plant.muscle.law(pressures[0], plant.lever.contraction(angle[0], plant.muscle.rest_length))
+    x = plant.lever.contraction(angle[0], plant.muscle.rest_length)
+    law = plant.muscle.law(pressures[0], x)
     assert 0.0 < law[0] < drag[0, 0]
     lever = plant.lever.rate(angle[0])
     torque = -np.sum(np.maximum(law - drag[0], 0.0) * lever)
-    assert model.set_point(angle, np.array([torque]), drag) == pytest.approx(np.radians(26.5), abs=1e-3)
+    found = model.set_point(angle, np.array([torque]), drag)
+    assert found == pytest.approx(np.radians(26.5), abs=1e-3)
 
 
 def test_command_leads_to_the_difference_of_both_pressures():

@@ -50,6 +50,18 @@ def test_no_controller_passes_the_bound_of_the_oracle():
             assert least < 1.02 * found
 
 
+def test_actions_of_a_controller_improve_the_search_with_a_short_horizon():
+    track: ScenarioSet = available()["positioning_nominal"]
+    scenario = next(s for s in track.scenarios() if s.name == "maxwell_slip_2.55kg_steps")
+    scenario.kwargs["episode_seconds"] = 5.0
+    plain, started = (
+        scores_of(one, track.content, scenario.rests)["rms_error"]
+        for start in ("", "predictive_inverse")
+        for one in play(track, scenario, (900_001,), 20, start)
+    )
+    assert started < 0.9 * plain
+
+
 @pytest.mark.parametrize(
     ("track", "score", "points"),
     [("manipulator_nominal", of_chain, 2), ("elbow_nominal", of_elbow, 1)],
