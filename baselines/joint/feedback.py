@@ -194,6 +194,6 @@ ENTRIES = {
         "joint_pid_smooth with gravity feedforward and a reference previewed by its own delay",
         make=partial(PREVIEW, kind="pid_smooth"),
         preview=True,
-        knobs={**PID_KNOBS, **PREVIEW_KNOBS},
+        knobs={**PID_KNOBS, "derivative_time": (0.03, 16.0), **PREVIEW_KNOBS},
     ),
 }
