@@ -68,8 +68,10 @@ LEAD = 0.5
 is compensated by a torque proportional to the rate of the reference."""
 LEAST_NOISE = 1e-4
 """Smallest noise [rad] of the sensed angle for which the observer is designed."""
-RATE_STEP, TORQUE_STEP = 0.02, 0.01
-"""Random steps per period of the rate [rad/s] and of the disturbance torque [N m]."""
+RATE_STEP, TORQUE_STEP = 0.002, 0.01
+"""Random steps per period of the rate [rad/s] and of the disturbance torque [N m]. The first is
+small: with a larger one the filter attributes to the rate what slow friction or creep causes, and
+the estimated torque lags by seconds in an arm."""
 LARGEST_ERROR, LARGEST_RATE_ERROR = 0.05, 0.5
 """Limits of the errors of angle [rad] and rate [rad/s] that are fed back."""
 END_TOLERANCE = 1e-4
@@ -86,8 +88,8 @@ COMPENSATION_DAMPING = 0.02
 GRADIENT = 1e-4
 """Step of the angle [rad] with which the stiffness due to the weight is computed."""
 KNOBS: Bounds = {"lead": (0.1, 4.0), "observer": (0.03, 10.0), "feedback": (0.1, 10.0)}
-"""Factors on the lead, on the random steps for which the observer is designed, and on the weight of
-an angle error in the linear-quadratic regulator."""
+"""Factors on the lead, on the random step of the torque for which the observer is designed, and on
+the weight of an angle error in the linear-quadratic regulator."""
 
 
 class PredictiveState(NamedTuple):
@@ -173,16 +175,20 @@ class StraightMotion:
         link = self.plant.link
         return np.array([[link.inertia + payload * link.length**2]])
 
-    def _gains(self, payload: float) -> tuple[Array, Array]:
+    def linear(self, payload: float) -> LinearMotion:
+        """Return the linear motion about the straight pose with a payload [kg]."""
         plant, model, unit = self.plant, self.model, np.eye(self.plant.stages)
         held, weight = np.full(len(unit), payload), Gravity(plant).torque
         slope = weight(GRADIENT * unit, held) - weight(-GRADIENT * unit, held)
         stiffness = model.stiffness * unit + slope / (2.0 * GRADIENT)
         damping = model.damping + self.damping
-        motion = LinearMotion.make(self._mass(payload), damping, stiffness, plant.control_period)
+        return LinearMotion.make(self._mass(payload), damping, stiffness, plant.control_period)
+
+    def _gains(self, payload: float) -> tuple[Array, Array]:
+        plant, motion = self.plant, self.linear(payload)
         noise = max(LEAST_NOISE, math.hypot(plant.angle.noise, plant.angle.resolution / 12**0.5))
-        steps = (self.observer * RATE_STEP, self.observer * TORQUE_STEP)
-        regulator = motion.regulator(self.feedback * model.stiffness)
+        steps = (RATE_STEP, self.observer * TORQUE_STEP)
+        regulator = motion.regulator(self.feedback * self.model.stiffness)
         return motion.observer(noise, *steps), regulator
 
 

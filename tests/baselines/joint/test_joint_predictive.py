@@ -7,6 +7,7 @@ import pytest
 from baselines.joint import predictive
 from baselines.joint.model_following import ModelFollowing
 from baselines.joint.pair_model import LinearMotion, PairModel
+from baselines.joint.predictive import StraightMotion
 from baselines.predictive.regulator import RegulatorBank
 from pam_envs.constants import GRAVITY
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -54,6 +55,21 @@ def test_linear_motion_rests_where_the_stiffness_holds_the_torque():
     np.testing.assert_allclose(rest, np.vstack([held, np.zeros((2, 2))]), atol=1e-9)
     gains, _, _ = control.dlqr(motion.a, motion.b, np.diag([900.0, 900.0, 0, 0]), np.eye(2))
     np.testing.assert_allclose(motion.regulator(30.0), gains, rtol=1e-6)
+
+
+def test_estimate_of_a_rising_torque_lags_by_a_quarter_of_a_second_at_most_in_an_arm():
+    plant = RedundantManipulator.paper()
+    straight = StraightMotion(plant, PairModel(plant), observer=1.0, feedback=1.0)
+    motion, (observer, _), n = straight.linear(0.0), straight.gains(0.0), plant.stages
+    whole = np.block([[motion.a, motion.b], [np.zeros((n, 2 * n)), np.eye(n)]])
+    true, found, step = np.zeros(3 * n), np.zeros(3 * n), 0.01  # N m per period
+    for _ in range(1000):
+        true = whole @ true
+        true[2 * n :] += step
+        expected = whole @ found
+        found = expected + observer @ (true[:n] - expected[:n])
+    periods = (true - found)[2 * n :] / step
+    assert np.all(plant.control_period * periods < 0.25)
 
 
 def test_setpoint_exerts_the_torque_at_an_angle():
