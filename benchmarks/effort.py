@@ -79,7 +79,7 @@ TRACKS = ("knee_walk_nominal", "knee_stairs_up_nominal", "knee_stairs_down_nomin
 def pareto_figure() -> Any:
     """Return RMS error against effort of the gaits' nominal tracks, the dominant rows joined."""
     from matplotlib.figure import Figure
-    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     figure = Figure(figsize=(10.5, 4.0), layout="constrained")
     for ax, track in zip(figure.subplots(1, 3), TRACKS, strict=True):
@@ -93,9 +93,12 @@ def pareto_figure() -> Any:
         ]
         best: list[tuple[float, ...]] = []
         names: list[str] = []
+        stacked = 0  # height of a number above those of points beside it [points]
         for (error, effort), row in sorted(zip(points, found, strict=True), key=lambda p: p[0]):
-            front = not best or effort < best[-1][1]
+            front, above = not best or effort < best[-1][1], 5
             if front:
+                stacked += 9 if best and error < 1.3 * best[-1][0] else -stacked
+                above += stacked
                 best.append((error, effort))
             ax.plot(error, effort, "o", color="C0" if front else "0.6", markersize=5)
             name, label = row["controller"]["name"].removeprefix("knee_"), ""
@@ -105,16 +108,18 @@ def pareto_figure() -> Any:
             elif row["controller"]["name"] in (VENTED, RANDOM):
                 label = name
             ax.annotate(
-                label, (error, effort), fontsize=7, xytext=(4, 5), textcoords="offset points"
+                label, (error, effort), fontsize=7, xytext=(4, above), textcoords="offset points"
             )
         ax.text(0.03, 0.97, "\n".join(names), fontsize=7, va="top", transform=ax.transAxes)
         ax.plot(*zip(*best, strict=True), color="C0", linewidth=0.8)
         ax.axhline(1.0, color="0.3", linewidth=0.8, linestyle=":")
         ax.set_xscale("log")
         ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        ax.xaxis.set_major_formatter(ScalarFormatter())
+        ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.margins(x=0.2, y=0.25)
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high + 0.05 * len(names) * (high - low))  # room for the names
         ax.set_title(track.removeprefix("knee_").removesuffix("_nominal").replace("_", " "))
         ax.set_xlabel("RMS tracking error [N]")
         ax.spines[["top", "right"]].set_visible(False)

@@ -324,7 +324,7 @@ class Preisach(HysteresisModel):
         return self._each(advance_rows, x, state)
 
     def after(self, x: ArrayLike, state: PreisachState) -> PreisachState:
-        """Return the state after inputs one after the other, shape (T, *batch)."""
+        """Return the state after inputs one after the other, shape ``(T, *batch)``."""
         values, rows = np.array(x, float).reshape(len(np.asarray(x)), -1), self._rows(state)
         outputs = np.empty_like(values)
         advance_rows(values, *rows, self.everett, self.low, self.inverse_cell, outputs)

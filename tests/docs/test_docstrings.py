@@ -1,4 +1,4 @@
-"""Docstrings: every public name has one, and every number described in one has a unit."""
+"""Docstrings: every public name has one, its numbers have units, and its markup is valid."""
 
 import ast
 import re
@@ -37,6 +37,11 @@ def public(tree: ast.Module) -> Iterator[tuple[str, ast.AST]]:
                 nodes.append((f"{prefix}{child.name}.", child))
 
 
+LITERAL = re.compile(r"``.*?``", re.S)
+STAR = re.compile(r"(?<![\w*\\])\*(?=\w)(?![^*\n]+\*(?!\w)).*")
+"""A star that begins emphasis and is not closed on its line: a warning stops the site's build."""
+
+
 def numbers_without_unit(docstring: str) -> list[str]:
     """Return the numpydoc entries of a docstring whose number has no unit."""
     entries = [
@@ -49,8 +54,8 @@ def numbers_without_unit(docstring: str) -> list[str]:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_public_names_have_docstrings_and_their_numbers_units(package):
-    missing, without_unit = [], []
+def test_public_names_have_docstrings_with_units_and_closed_emphasis(package):
+    missing, without_unit, open_stars = [], [], []
     for path in sorted((ROOT / package).rglob("*.py")):
         for name, node in public(ast.parse(path.read_text())):
             shown = f"{path.relative_to(ROOT)}: {name}"
@@ -58,6 +63,8 @@ def test_public_names_have_docstrings_and_their_numbers_units(package):
             if not text:
                 missing.append(shown)
             without_unit += [f"{shown}: {entry}" for entry in numbers_without_unit(text or "")]
+            open_stars += [f"{shown}: {star}" for star in STAR.findall(LITERAL.sub("", text or ""))]
+    assert open_stars == []
     assert missing == []
     assert without_unit == []
 
@@ -66,3 +73,8 @@ def test_number_without_unit_is_found():
     text = "Parameters\n----------\nload : float\n    Mass{}.\nflags : ndarray of bool\n    x\n"
     assert numbers_without_unit(text.format("")) == ["load : float Mass."]
     assert numbers_without_unit(text.format(" [kg]")) == []
+
+
+def test_open_emphasis_is_found():
+    assert STAR.findall("Return an array (T, *batch).") == ["*batch)."]
+    assert STAR.findall("*Ratio* and 2 * width of p*_k; **both** as") == []

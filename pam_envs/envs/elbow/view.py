@@ -15,6 +15,8 @@ ELBOW: S.Point = (92.0, 300.0)
 """Position of the elbow [pixels], at the lower end of the upper arm."""
 PER_METRE = 470.0
 PULLEY = 30.0
+SCALE: S.Point = (262.0, 100.0)
+"""Position of the colour scale of pressures [pixels]."""
 PULL_A, PULL_B = (170, 90, 160), (0, 140, 100)
 """Colours of bundle a and of bundle b."""
 TORQUE_SPAN = 12.0
@@ -73,7 +75,8 @@ def elbow_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
     canvas.disc(ELBOW, 5.0, S.INK)
     canvas.disc(hand, 9.0, S.blend(S.SKIN, S.INK, 0.35))
     _object(canvas, info, hand)
-    S.pressure_scale(canvas, info["state/pressure_b"], full)
+    S.pressure_scale(canvas, info["state/pressure_a"], full, *SCALE, PULL_A)
+    S.pressure_pointer(canvas, info["state/pressure_b"], full, *SCALE, PULL_B)
     for x, name, color in ((46.0, "a", PULL_A), (138.0, "b", PULL_B)):
         canvas.text(f"bundle {name}", (x, 62), color, 11, "center")
     bars = [
@@ -130,10 +133,11 @@ VIEW = S.View(
     (
         S.Strip("torque", "N m", 1.0, S.LINES, 350, 56, (-8.0, 8.0), range(-8, 9, 4)),
         S.Strip("stiffness", "N m/rad", 1.0, STIFFNESS, 442, 46, (0.0, 12.0), range(0, 13, 4)),
-        S.pressure_strip(524, 40, "pressures, a and b", PRESSURES),
+        S.pressure_strip(520, 40, "pressures, a and b", PRESSURES),
     ),
     ElbowAllocation,
     number=("torque at the hand", "N m", lambda info: info["state/felt"]),
+    number_color=S.INK,
     trace=lambda info: (info["state/torque"], info["state/stiffness"]),
     panel=_reach,
 )

@@ -12,6 +12,8 @@ from pam_envs.envs.rendering import scene as S
 
 PIVOT: S.Point = (140.0, 196.0)
 """Position of the joint's axis [pixels]."""
+SCALE: S.Point = (282.0, 290.0)
+"""Position of the colour scale of pressures [pixels]."""
 PER_METRE = 1350.0
 ARM = 0.14
 """Length [m] of the arm that is drawn below the axis."""
@@ -77,7 +79,8 @@ def joint_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
     """Draw the joint with its muscles, the reference, the disturbance and the payload."""
     plant, angle = env.plant, info["state/angle"]
     lever, full = plant.lever, plant.regulator.max_pressure
-    S.pressure_scale(canvas, info["state/pressure_a"], full, 282.0, 290.0)
+    S.pressure_scale(canvas, info["state/pressure_a"], full, *SCALE, PULL_A)
+    S.pressure_pointer(canvas, info["state/pressure_b"], full, *SCALE, PULL_B)
     _scale(canvas, plant.angle_range[1])
     canvas.dashed(PIVOT, turned(info["reference"], 0.0, ARM + 0.004), S.REFERENCE)
     base = lever.l_u
@@ -183,6 +186,7 @@ VIEW = S.View(
     (ANGLE, PRESSURES),
     JointIntegral,
     number=("pressures, A - B", "bar", both_pressures),
+    number_color=S.INK,
     trace=lambda info: (both_pressures(info), info["output"]),
     panel=_difference_loop,
 )

@@ -150,11 +150,11 @@ class BraceFeedforward:
 
 
 ANGLES = (("state/angle_reference", S.REFERENCE, 1.5), ("state/angle", S.OUTPUT, 2.0))
-ANGLE = S.Strip("angle", "deg", 180.0 / math.pi, ANGLES, 446, 56, (80.0, 180.0), (80, 130, 180))
+ANGLE = S.Strip("angle", "deg", 180.0 / math.pi, ANGLES, 440, 54, (80.0, 180.0), (80, 130, 180))
 PRESSURE = S.pressure_strip(498, 60)
 TENSION = S.Strip("tension", "N", 1.0, S.LINES, 350, 116, (0.0, 360.0), range(0, 361, 100))
 STIFFNESS = S.Strip("stiffness", "N/cm", 1e-2, S.LINES, 350, 116, (0.0, 80.0), range(0, 81, 20))
-GAIT = S.Strip("tension", "N", 1.0, S.LINES, 350, 64, (0.0, 400.0), range(0, 401, 200))
+GAIT = S.Strip("tension", "N", 1.0, S.LINES, 350, 60, (0.0, 400.0), range(0, 401, 200))
 TENSION_VIEW = S.View(brace_scene, (TENSION, PRESSURE), BraceFeedforward)
 STIFFNESS_VIEW = S.View(brace_scene, (STIFFNESS, PRESSURE), BraceFeedforward)
-GAIT_VIEW = S.View(gait_scene, (GAIT, ANGLE, S.pressure_strip(534, 34)), BraceFeedforward)
+GAIT_VIEW = S.View(gait_scene, (GAIT, ANGLE, S.pressure_strip(524, 36)), BraceFeedforward)

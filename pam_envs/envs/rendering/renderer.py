@@ -19,6 +19,8 @@ from pam_envs.envs.rendering import scene
 
 SIZE = (800, 600)
 SCALE = 2  # everything is drawn this many times larger and smoothed down, for anti-aliased edges
+FINE = 3  # text is drawn this many times larger still, so that gaps between letters are even
+LABELS = 300  # texts that are kept
 STRIP_SECONDS = 8.0
 LOOP_SAMPLES = 1500
 WINDOW_FPS = 50  # pictures per second in the window, at the pace of the plant
@@ -46,6 +48,7 @@ class Canvas:
         self.pygame.font.init()
         self.surface = self.pygame.Surface((SIZE[0] * SCALE, SIZE[1] * SCALE))
         self._fonts: dict[int, Any] = {}
+        self._labels: dict[tuple[str, scene.Color, int], Any] = {}
 
     def clear(self) -> None:
         """Start a new picture."""
@@ -99,11 +102,22 @@ class Canvas:
         align: str = "left",
     ) -> None:
         """Write text, with ``place`` at the left, centre or right of their upper edge."""
-        if size not in self._fonts:
-            self._fonts[size] = self.pygame.font.Font(None, round(1.45 * size * SCALE))
-        drawn = self._fonts[size].render(words, True, color)
+        drawn = self._label(words, color, size)
         shift = {"left": 0.0, "center": 0.5, "right": 1.0}[align] * drawn.get_width()
         self.surface.blit(drawn, (place[0] * SCALE - shift, place[1] * SCALE))
+
+    def _label(self, words: str, color: scene.Color, size: int) -> Any:
+        """Return a surface with a text; most texts are those of the last picture."""
+        key = (words, color, size)
+        if key not in self._labels:
+            if len(self._labels) >= LABELS:
+                self._labels.clear()
+            if size not in self._fonts:
+                self._fonts[size] = self.pygame.font.Font(None, round(1.45 * size * SCALE * FINE))
+            fine = self._fonts[size].render(words, True, color)
+            pixels = [round(length / FINE) for length in fine.get_size()]
+            self._labels[key] = self.pygame.transform.smoothscale(fine, pixels)
+        return self._labels[key]
 
     def picture(self) -> Any:
         """Return the surface in its final size."""
@@ -160,7 +174,7 @@ class Renderer:
         for x, title, value, color in (
             (360, "time", f"{info['time']:.2f} s", scene.INK),
             (475, "error", f"{error:+.2f} {first.unit}", scene.INK),
-            (600, name, f"{number(info):.2f} {unit}", scene.PRESSURE),
+            (600, name, f"{number(info):.2f} {unit}", self.view.number_color),
         ):
             text(title, (x, 14), scene.MUTED, 11)
             text(value, (x, 29), color, 16)

@@ -73,6 +73,7 @@ class View:
         lambda info: 1e-5 * info["state/pressure"],
     )
     """Name, unit and value (from ``info``) of the number beside time and error."""
+    number_color: Color = PRESSURE
     trace: Callable[[Any], tuple[float, ...]] = lambda info: (
         1e-5 * info["state/pressure"],
         info["output"],
@@ -111,6 +112,8 @@ def pressure_strip(
     return Strip(name, "bar", 1e-5, lines, top, height, lambda p: (0.0, full_bar(p)), ticks)
 
 
+SCALE_HEIGHT = 120.0
+"""Height of the colour scale of pressures [pixels]."""
 PANEL: Box = (360, 88, 410, 200)  # position and size of the plot above the strips
 
 
@@ -175,19 +178,31 @@ class Axes:
 
 
 def pressure_scale(
-    canvas: Canvas, pressure: float, full: float, left: float = 262.0, top: float = 100.0
+    canvas: Canvas,
+    pressure: float,
+    full: float,
+    left: float = 262.0,
+    top: float = 100.0,
+    color: Color = PRESSURE,
 ) -> None:
     """Draw the colour scale of pressures [Pa] from 0 to ``full``, and a pointer."""
-    height = 120.0
+    height = SCALE_HEIGHT
     for i in range(60):
-        color = blend(HOT, COLD, i / 59)
-        canvas.rectangle((left, top + i * height / 60, 12, height / 60 + 0.5), color)
+        shade = blend(HOT, COLD, i / 59)
+        canvas.rectangle((left, top + i * height / 60, 12, height / 60 + 0.5), shade)
     for bar in (0.0, 0.5e-5 * full, 1e-5 * full):
         y = top + height * (1.0 - 1e5 * bar / full)
         canvas.text(f"{bar:g}", (left + 18, y - 6), MUTED, 11)
     canvas.text("bar", (left + 6, top - 22), MUTED, 11, "center")
-    y = top + height * (1.0 - min(1.0, max(0.0, pressure / full)))
-    canvas.polygon([(left - 2, y), (left - 12, y - 6), (left - 12, y + 6)], PRESSURE)
+    pressure_pointer(canvas, pressure, full, left, top, color)
+
+
+def pressure_pointer(
+    canvas: Canvas, pressure: float, full: float, left: float, top: float, color: Color
+) -> None:
+    """Draw a pointer at a pressure [Pa] beside the colour scale at ``left`` and ``top``."""
+    y = top + SCALE_HEIGHT * (1.0 - min(1.0, max(0.0, pressure / full)))
+    canvas.polygon([(left - 2, y), (left - 12, y - 6), (left - 12, y + 6)], color)
 
 
 def limb(canvas: Canvas, a: Point, b: Point, thick: float, thin: float, color: Color) -> None:
@@ -204,13 +219,16 @@ def limb(canvas: Canvas, a: Point, b: Point, thick: float, thin: float, color: C
 def torque_bars(
     canvas: Canvas, bars: Sequence[tuple[str, float, Color]], span: float, top: float, note: str
 ) -> None:
-    """Draw horizontal bars of torques [N m] up to ``span``, positive to the right."""
+    """Draw horizontal bars of torques [N m], positive to the right, with a tip beyond ``span``."""
     zero, half = 196.0, 76.0
     for row, (name, torque, color) in enumerate(bars):
         y, end = top + 20.0 * row, zero + half * max(-1.0, min(1.0, torque / span))
         canvas.text(name, (112, y - 1), MUTED, 11, "right")
         canvas.rectangle((zero - half, y, 2 * half, 12), GRID, 2)
         canvas.rectangle((min(zero, end), y, max(1.0, abs(end - zero)), 12), color, 2)
+        if abs(torque) > span:
+            tip = math.copysign(5.0, torque)
+            canvas.polygon([(end, y), (end + tip, y + 6), (end, y + 12)], color)
         canvas.line([(zero, y - 3), (zero, y + 15)], MUTED, 1)
         canvas.text(f"{torque:+.1f}", (314, y - 1), color, 11, "right")
     canvas.text(note, (314, 574), MUTED, 11, "right")

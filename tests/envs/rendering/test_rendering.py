@@ -22,6 +22,7 @@ def test_picture_shows_the_state(name: str) -> None:
     first = env.render()
     assert first.shape == (600, 800, 3)
     assert first.dtype == np.uint8
+    assert np.all(first[-1] == first[-1, 0])  # no text is cut off at the lower edge
     assert np.array_equal(first, env.render())  # looking changes nothing
     for _ in range(60):
         env.step(env.action_space.high)
@@ -165,3 +166,16 @@ def test_every_load_can_be_drawn(load: float) -> None:
         pictures.append(env.render())
         env.close()
     assert (pictures[0][60:, :320] != pictures[1][60:, :320]).any(axis=2).sum() > 5000
+
+
+def test_torque_beyond_the_scale_has_a_tip() -> None:
+    from pam_envs.envs.rendering import renderer, scene
+
+    pictures = []
+    for torque in (30.0, 30.1, -30.1):
+        canvas = renderer.Canvas()
+        canvas.clear()
+        scene.torque_bars(canvas, [("", torque, scene.INK)], 30.0, 100.0, "")
+        picture = canvas.pygame.surfarray.array3d(canvas.picture())
+        pictures.append([np.any(picture[x, 100:112] == scene.INK[0]) for x in (117, 274)])
+    assert pictures == [[False, False], [False, True], [True, False]]
