@@ -105,8 +105,8 @@ def _verdicts(ordered: Track, made: Sequence[Claim]) -> list[str]:
     lines = [f"- Best classical controller: `{views.name_of(rival)}`."]
     for entry in made:
         lines.append(
-            f"- `{views.name_of(entry.row)}`: {full_verdict(entry)}; lower by "
-            f"{fmt.percent(entry.gain)}, P(improvement) {fmt.chance(entry.probability)}."
+            f"- `{views.name_of(entry.row)}`: {full_verdict(entry)}; "
+            f"{fmt.reduction(entry.gain)}, P(improvement) {fmt.chance(entry.probability)}."
         )
     return [*lines, ""]
 

@@ -59,6 +59,13 @@ def percent(interval: Interval) -> str:
     return f"{value} % [{low}, {high}]" if np.isfinite(interval.low) else f"{value} %"
 
 
+def reduction(interval: Interval) -> str:
+    """Return a relative reduction in words: "lower by 5 % [2, 8]", or "higher by ..."."""
+    sign, word = (-1.0, "higher") if interval.value < 0.0 else (1.0, "lower")
+    low, high = sorted((sign * interval.low, sign * interval.high))
+    return f"{word} by {percent(Interval(sign * interval.value, low, high)).replace('+', '')}"
+
+
 def _percent(share: float) -> str:
     size = 100.0 * share
     return f"{size:+.0f}" if abs(size) >= 9.95 else f"{size:+.2g}"

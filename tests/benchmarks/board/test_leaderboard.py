@@ -1,6 +1,7 @@
 """LEADERBOARD.md and its pages: summary, narrow tables, equal bytes for equal rows."""
 
 import json
+import math
 import re
 import subprocess
 from dataclasses import replace
@@ -13,13 +14,14 @@ import pytest
 from benchmarks.__main__ import main
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, format, leaderboard, plots, standings, summary
-from benchmarks.board.format import duration, number, table
+from benchmarks.board.format import duration, number, reduction, table
 from benchmarks.bounds import run as bounding
 from benchmarks.bounds.run import Bound, Bounds
 from benchmarks.identity import audit
 from benchmarks.runs import rows
 from benchmarks.scoring.group import Column
 from benchmarks.scoring.metrics import GROUPS, columns_of, of_track
+from benchmarks.scoring.statistics import Interval
 
 AUTHOR = ("-c", "user.name=test", "-c", "user.email=test@example.org")
 BOARD, PAGE = leaderboard.BOARD.name, "leaderboard/MusclePositioning.md"
@@ -43,6 +45,18 @@ def cells_of(text: str, name: str) -> list[list[str]]:
     """Return the cells of every table line of a controller."""
     lines = [line for line in text.splitlines() if f"| `{name}` |" in line]
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"),
+    [
+        (Interval(0.5, 0.46, 0.54), "lower by 50 % [46, 54]"),
+        (Interval(-0.18, -0.42, 0.05), "higher by 18 % [-5, 42]"),
+        (Interval(0.05, math.nan, math.nan), "lower by 5 %"),
+    ],
+)
+def test_reduction_says_lower_or_higher(gain, words):
+    assert reduction(gain) == words
 
 
 def test_files_do_not_depend_on_order_and_machine(files):
@@ -75,7 +89,7 @@ def test_first_table_shows_paper_classical_learned_and_oracle(files):
 def test_claim_of_each_track_is_a_line_with_its_reasons(files):
     (detail,) = re.findall(r"^- short_nominal: .*$", files[BOARD], re.MULTILINE)
     assert "`ppo` 0.500 [" in detail and "against `inverse` 1.00 [" in detail
-    assert "; lower by +50 % [+46, +54]; P(improvement) 1.00 [1.00, 1.00]; largest" in detail
+    assert "; lower by 50 % [46, 54]; P(improvement) 1.00 [1.00, 1.00]; largest" in detail
     assert detail.endswith("; better (settings tried: 40, 0 for inverse)")
 
 
