@@ -374,7 +374,8 @@ def bound(
         track: Names of scenario files.
         episodes: Number of episodes of each scenario, its first public ones.
         horizon: Control periods that are predicted.
-        start: Controller whose actions in the same episodes the search starts from.
+        start: Name of a controller; its actions in the same episodes are a candidate of every
+            search. Default: none.
         write: Write the result into benchmarks/results/oracle.json.xz, which the board reads.
     """
     from benchmarks.bounds import run as bounding

@@ -1,7 +1,7 @@
 """Controllers with knobs from a search: reader of ``tuned.yaml``.
 
-The search (``python -m benchmarks tune``) uses the same number of trials and the same tuning seeds
-as the search over a learned controller's settings. Its result is for one environment, on its
+The search (``python -m benchmarks tune``) uses the same sampler and the same tuning seeds as the
+search over a learned controller's settings; the number of trials is in each entry. Its result is for one environment, on its
 nominal plant or on plants drawn in each episode, and is a separate entry beside the controller as
 published.
 """

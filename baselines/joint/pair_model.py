@@ -70,7 +70,7 @@ def friction_of(
 
 @kernel
 def force_of(table: Any, cell: int, share: float, side: int, pressure: float) -> float:
-    """Return the force [N] of the static law, negative where the muscle is slack."""
+    """Return the force [N] of the static law; it may be negative."""
     force = pressure * looked_up(table, cell, share, AREA + side)
     return force - looked_up(table, cell, share, PASSIVE + side)
 
@@ -104,7 +104,7 @@ def friction_rows(
     table: Array, numbers: Array, thresholds: Array, curves: Array, low: float, per: float,
     angles: Array, pressures: Array, sliders: Array, drags: Array,
 ) -> None:  # fmt: skip
-    """Write the frictions [N] of both muscles at successive angles [rad], shape (rows, n, 2).
+    """Write the friction forces [N] of both muscles at successive angles [rad], (rows, n, 2).
 
     The sliders, shape (rows, 2, elements), are changed in place to those at the last angle.
     """
@@ -128,7 +128,7 @@ def share_of(value: float, least: float, most: float) -> float:
 
 @kernel
 def torque_under(table: Any, cell: int, share: float, both: Any, k: int, drag: Any) -> float:
-    """Return the torque [N m] at setpoint ``k`` under the frictions [N] of the muscles, (2,)."""
+    """Return the torque [N m] at setpoint ``k`` with friction forces [N] of the muscles, (2,)."""
     torque = 0.0
     for side in range(2):
         force = max(0.0, force_of(table, cell, share, side, both[side, k]) - drag[side])
@@ -290,9 +290,10 @@ class PairModel:
         return Pull(*found), after
 
     def friction(self, angles: Array, pressures: Array, sliders: Array) -> tuple[Array, Array]:
-        """Return the frictions [N] of both muscles at successive angles, and the sliders.
+        """Return the friction forces [N] of both muscles at successive angles, and the sliders.
 
-        Angles have the shape (rows, n), frictions (rows, n, 2).
+        Angles [rad] have the shape (rows, n), friction forces (rows, n, 2). The pressures [Pa],
+        shape (rows, 2), are the same at all angles.
         """
         given, after = np.ascontiguousarray(angles), sliders.copy()
         drags = np.empty((*given.shape, 2))
@@ -302,8 +303,9 @@ class PairModel:
     def set_point(self, angle: Array, torque: Array, drag: Array) -> Array:
         """Return the setpoints [rad] at which the muscles exert torques [N m] at angles [rad].
 
-        Angles and torques may have any shape; frictions ``drag`` [N] have one axis more, of length
-        2. A slack muscle exerts neither force nor friction. If a torque is out of reach, the
+        Angles and torques may have any shape; friction forces ``drag`` [N] have one axis more, of
+        length 2. The force of a muscle is that of the static law less its friction, and zero if
+        this is negative (slack). If a torque is out of reach, the
         setpoint is the end of its range.
         """
         found = np.empty(angle.size)

@@ -8,12 +8,13 @@ for the single muscle (:mod:`baselines.positioning.predictive`). Friction is dri
 the muscles, and hence by the angle, so that it is known in advance along a previewed reference
 ``r``. To follow the reference the muscles have to exert
 
-    torque = M r'' + D r' + weight(r) - friction(r) - d + P e + Q e'
+    torque = M r'' + D r' + weight(r) - d + P e + Q e'
 
-where ``friction`` is the torque of the friction on the joint, ``d`` the disturbance torque, and
-``e = r - q`` the error predicted for the time at which a setpoint takes effect. ``M`` is the mass
-matrix of the straight joints; in an arm it couples the joints. The static law gives the setpoints
-at which the muscles exert this torque at the angle ``r``. The difference between the two pressures
+where ``d`` is the disturbance torque, and ``e = r - q`` the error predicted for the time at which a
+setpoint takes effect. ``M`` is the mass matrix of the straight joints; in an arm it couples the
+joints. The static law less the friction of each muscle gives the setpoints at which the muscles
+exert this torque at the angle ``r``; a muscle whose friction exceeds the force of its static law is
+slack and exerts no force. The difference between the two pressures
 of a joint, which changes by at most twice the rate limit, follows the best rate-limited path
 towards the differences of those setpoints (:mod:`baselines.predictive.rate_limited`).
 
@@ -69,9 +70,9 @@ is compensated by a torque proportional to the rate of the reference."""
 LEAST_NOISE = 1e-4
 """Smallest noise [rad] of the sensed angle for which the observer is designed."""
 RATE_STEP, TORQUE_STEP = 0.002, 0.01
-"""Random steps per period of the rate [rad/s] and of the disturbance torque [N m]. The first is
-small: with a larger one the filter attributes to the rate what slow friction or creep causes, and
-the estimated torque lags by seconds in an arm."""
+"""Random steps per period of the rate [rad/s] and of the disturbance torque [N m]. With an accurate
+sensor, the estimate of a steadily changing torque lags by the inertia times the first over the
+second: by 0.2 s per kg m2. In an arm the inertia is up to 0.8 kg m2."""
 LARGEST_ERROR, LARGEST_RATE_ERROR = 0.05, 0.5
 """Limits of the errors of angle [rad] and rate [rad/s] that are fed back."""
 END_TOLERANCE = 1e-4
@@ -370,7 +371,11 @@ class JointPredictive(RowController):
         )
 
     def _levels(self, view: JointView, then: PredictiveState, demand: Demand) -> Array:
-        """Return the setpoints [rad] at which the muscles exert the torques of a demand."""
+        """Return the setpoints [rad] at which the muscles exert the torques of a demand.
+
+        The friction is that at the pressures at which a setpoint takes effect, not at those of the
+        nodes.
+        """
         shape, model = demand.angle.shape, self.model
         flat = demand.angle.reshape(-1, shape[2])
         drag, _ = model.friction(flat, then.pressure.reshape(-1, 2), _flat(then.sliders))

@@ -106,7 +106,7 @@ def _verdicts(ordered: Track, made: Sequence[Claim]) -> list[str]:
     for entry in made:
         lines.append(
             f"- `{views.name_of(entry.row)}`: {full_verdict(entry)}; "
-            f"{fmt.reduction(entry.gain)}, P(improvement) {fmt.chance(entry.probability)}."
+            f"{fmt.reduction_words(entry.gain)}, P(improvement) {fmt.chance(entry.probability)}."
         )
     return [*lines, ""]
 

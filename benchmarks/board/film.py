@@ -66,7 +66,9 @@ def write(
 
     pictures = [played(track, scenario, seed, *one) for one in sides(track, best, scenario)]
     if oracle:
-        (episode,) = bounding.play(track, scenario, (seed,), bounding.HORIZON)
+        stored = bounding.read().get(track.name)
+        how = (stored.horizon, stored.start) if stored else (bounding.HORIZON, "")
+        (episode,) = bounding.play(track, scenario, (seed,), *how)
         pictures.append(played(track, scenario, seed, SIDES[3], "", Replay(episode.actions)))
     path.parent.mkdir(parents=True, exist_ok=True)
     writer: Any = imageio.get_writer(path, fps=FRAMES, macro_block_size=8)

@@ -56,13 +56,20 @@ def chance(interval: Interval | None) -> str:
 def percent(interval: Interval) -> str:
     """Return a share with its interval in percent, signs and all."""
     value, low, high = map(_percent, (interval.value, interval.low, interval.high))
-    return f"{value} % [{low}, {high}]" if np.isfinite(interval.low) else f"{value} %"
+    return (
+        f"{value} % [{low}, {high}]"
+        if np.isfinite([interval.low, interval.high]).all()
+        else f"{value} %"
+    )
 
 
-def reduction(interval: Interval) -> str:
-    """Return a relative reduction in words: "lower by 5 % [2, 8]", or "higher by ..."."""
+def reduction_words(interval: Interval) -> str:
+    """Return a relative reduction in words, a negative one as an increase.
+
+    For example "lower by 5 % [2, 8]" or "higher by 18 % [-5, 42]".
+    """
     sign, word = (-1.0, "higher") if interval.value < 0.0 else (1.0, "lower")
-    low, high = sorted((sign * interval.low, sign * interval.high))
+    low, high = sorted((sign * interval.low + 0.0, sign * interval.high + 0.0))
     return f"{word} by {percent(Interval(sign * interval.value, low, high)).replace('+', '')}"
 
 

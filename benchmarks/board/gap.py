@@ -188,6 +188,10 @@ def _gaps(gaps: Mapping[str, Gap | None], bounds: Mapping[str, Bounds]) -> list[
             lines.append([f"`{name}`", oracle, *both, _share(found), f"{found.travel:.2f}x"])
     missing = [f"`{name}`" for name in gaps if name not in bounds]
     beside = ["", f"The oracle has not run on {', '.join(missing)}."] if missing else []
+    for name in gaps:
+        if name in bounds and (start := bounds[name].start):
+            words = f"On `{name}` the actions of `{start}` are a candidate of every search"
+            beside += ["", f"{words} of the oracle."]
     return [*tables(heading, lines), *beside] if lines else ["The oracle has not run."]
 
 
@@ -269,8 +273,8 @@ def gain(rows: Sequence[Row], matched: bool = False) -> Gain | None:
 
 
 def _gains(tracks: Mapping[str, Track]) -> list[str]:
-    heading = ["track", "controller", "RMS", "best other", "its RMS", "lower by", "P", "result"]
-    heading += ["tried", "matched", "lower by than matched"]
+    heading = ["track", "controller", "RMS", "best other", "its RMS", "reduction", "P", "result"]
+    heading += ["tried", "matched", "reduction against matched"]
     lines: list[list[str]] = []
     gains = {name: gain(rows) for name, rows in tracks.items()}
     for name, found in gains.items():

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, gap, standings
 from benchmarks.board.claims import Claim
-from benchmarks.board.format import chance, number, reduction, table, tables
+from benchmarks.board.format import chance, number, reduction_words, table, tables
 from benchmarks.board.standings import Track
 from benchmarks.board.words import (
     change_cells,
@@ -217,7 +217,7 @@ def _detail(best: Best) -> str:
     return (
         f"- {best.track}: `{views.name_of(entry.row)}` {score_words(entry.row, entry.split)} "
         f"against `{views.name_of(best.classical)}` {score_words(best.classical, entry.split)}; "
-        f"{reduction(entry.gain)}; P(improvement) {chance(entry.probability)}; largest cost "
+        f"{reduction_words(entry.gain)}; P(improvement) {chance(entry.probability)}; largest cost "
         f"{largest_cost(entry)}; {full_verdict(entry)}"
     )
 

@@ -15,9 +15,10 @@ blocking). Sensitivities are finite differences: one copy per unknown, its actio
 one period on. The differences are large and their sign alternates, since the thresholds of a
 hysteresis, a rate limit or the end of the range hide a small change or one direction. A step is the
 best of several lengths and dampings, so that the predicted cost never increases. The last plan,
-shifted, is the next starting point. The actions of a controller in the same episode, if they are
-given, extend it, and replace it where they cost less: Gauss-Newton alone can stay in a local
-minimum that is worse than that controller.
+shifted, is the next starting point. If the actions of a controller in the same episodes are given,
+the shifted plan ends with them, and in every search they are one more candidate for the whole
+horizon of a row. They are replayed without feedback, from the state of the oracle. Gauss-Newton
+alone may stay in a local minimum that is worse than that controller.
 
 Errors that are not scored (outside of the gate of a track, before it has settled) have the weight
 ``UNSCORED``: just enough to keep the plant in its usual range. With a larger weight the oracle
@@ -107,7 +108,7 @@ class Oracle:
     horizon : int
         Control periods.
     given : ndarray, shape (n, rows, n_act), optional
-        Actions of a controller in the same episodes.
+        Actions [-1 to 1] of a controller in the same episodes, held at the last one.
     """
 
     env: PlantVectorEnv
@@ -192,9 +193,10 @@ class Oracle:
     def _search(self, steps: Array) -> None:
         """Take the best of several lengths of steps, shape (horizon, rows, dampings, n_act)."""
         moves = [length * steps for length in LENGTHS] + [np.zeros_like(steps[:, :, :1])]
+        plans = [self.plan[:, :, None] + np.concatenate(moves, axis=2)]
         if self.given is not None:
-            moves.append((self._given_ahead() - self.plan)[:, :, None])
-        trials = np.clip(self.plan[:, :, None] + np.concatenate(moves, axis=2), -1.0, 1.0)
+            plans.append(self._given_ahead()[:, :, None])
+        trials = np.clip(np.concatenate(plans, axis=2), -1.0, 1.0)
         self._trial.take(self.env)
         costs = np.sum(self._errors(self._trial.run(trials)) ** 2, axis=-1)
         for k in range(trials.shape[2]):

@@ -56,7 +56,8 @@ class Bounds:
     episodes : sequence of Bound
         Those of all scenarios.
     start : str
-        Controller whose actions the search starts from; empty for none.
+        Controller whose actions are a candidate of every search; empty for none. A later change of
+        that controller does not void the bounds.
     """
 
     task: str
@@ -74,7 +75,8 @@ def bounds_of(
 ) -> Bounds:
     """Return the bounds of a track on the first public episodes of every scenario.
 
-    ``start`` is the controller of the catalogue whose actions the search starts from.
+    ``start`` is the name of a controller of the catalogue; its actions in the same episodes are a
+    candidate of every search.
     """
     most = track.content["seeds"]
     if not 1 <= episodes <= most:
@@ -149,14 +151,26 @@ def play(
 def _actions_of(
     controller: str, track: ScenarioSet, scenario: Scenario, seeds: tuple[int, ...]
 ) -> Array:
-    """Return a controller's actions, shape (n, rows, n_act); a shorter episode ends with zeros."""
+    """Return a controller's actions [-1 to 1], shape (n, rows, n_act).
+
+    The last action of a shorter episode is held.
+    """
     env = make_env(track.env, scenario.kwargs)
-    model, base = model_of(track.env, scenario, env), env.unwrapped
-    made = make_controller(controller, model, base.signals, base.action_signals)
-    episodes = [rollout.run(env, made, seed).actions for seed in seeds]
-    longest = max(map(len, episodes))
-    padded = [np.pad(one, ((0, longest - len(one)), (0, 0))) for one in episodes]
-    return np.stack(padded, axis=1).astype(float)
+    try:
+        model, base = model_of(track.env, scenario, env), env.unwrapped
+        made = make_controller(controller, model, base.signals, base.action_signals)
+        episodes = [rollout.run(env, made, seed) for seed in seeds]
+    finally:
+        env.close()
+    for seed, episode in zip(seeds, episodes, strict=True):
+        if not len(episode.actions):
+            raise ValueError(f"{controller} took no action in episode {seed}: {episode.failure}")
+    longest = max(len(episode.actions) for episode in episodes)
+    held = [
+        np.pad(one.actions, ((0, longest - len(one.actions)), (0, 0)), mode="edge")
+        for one in episodes
+    ]
+    return np.stack(held, axis=1).astype(float)
 
 
 def _held(env: object, observation: Array) -> Array:

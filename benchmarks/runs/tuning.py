@@ -1,6 +1,6 @@
 """Search over the knobs of a paper's controller, its free parameters, on tuning seeds.
 
-Classical controllers get as many trials as learned ones, by the same sampler, on the same seeds
+Classical controllers are searched as learned ones are, by the same sampler, on the same seeds
 (:mod:`agents.search.tune`, :mod:`agents.settings.seeds`), which no score is ever taken from. The
 episodes are those of an environment's nominal track but for the seeds, or, on drawn plants, those
 of its track with drawn plants.

@@ -1,5 +1,6 @@
 """Distance from the oracle: share of the gap, its conditions, and controllers beyond the papers."""
 
+import dataclasses
 import re
 from pathlib import Path
 from typing import Any
@@ -149,15 +150,18 @@ def test_controllers_beyond_the_papers_are_those_of_their_page():
 def test_page_of_the_board_and_of_the_command_are_equal(tmp_path, capsys, monkeypatch):
     made = track()
     monkeypatch.setattr(leaderboard, "load", lambda folder: made)
-    bounding.write({"short_nominal": oracle(made[0], 0.25)}, tmp_path)
+    bound = dataclasses.replace(oracle(made[0], 0.25), start="inverse_ahead")
+    bounding.write({"short_nominal": bound}, tmp_path)
     assert main(["gap", "--results", str(tmp_path)]) == 0
     page = leaderboard.files(made, bounding.read(tmp_path))["leaderboard/gap.md"]
     assert capsys.readouterr().out == page
+    assert "the actions of `inverse_ahead` are a candidate of every search" in page
 
 
 def test_written_bounds_are_read_back_beside_earlier_ones(tmp_path):
     made = track()
     first, second = (oracle(made[0], share) for share in (0.25, 0.5))
+    second = dataclasses.replace(second, start="inverse")
     bounding.write({"a": first, "b": first}, tmp_path)
     bounding.write({"b": second}, tmp_path)
     assert bounding.read(tmp_path) == {"a": first, "b": second}

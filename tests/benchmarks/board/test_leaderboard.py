@@ -14,7 +14,7 @@ import pytest
 from benchmarks.__main__ import main
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, format, leaderboard, plots, standings, summary
-from benchmarks.board.format import duration, number, reduction, table
+from benchmarks.board.format import duration, number, reduction_words, table
 from benchmarks.bounds import run as bounding
 from benchmarks.bounds.run import Bound, Bounds
 from benchmarks.identity import audit
@@ -52,11 +52,12 @@ def cells_of(text: str, name: str) -> list[list[str]]:
     [
         (Interval(0.5, 0.46, 0.54), "lower by 50 % [46, 54]"),
         (Interval(-0.18, -0.42, 0.05), "higher by 18 % [-5, 42]"),
+        (Interval(-0.18, -0.42, 0.0), "higher by 18 % [0, 42]"),
         (Interval(0.05, math.nan, math.nan), "lower by 5 %"),
     ],
 )
 def test_reduction_says_lower_or_higher(gain, words):
-    assert reduction(gain) == words
+    assert reduction_words(gain) == words
 
 
 def test_files_do_not_depend_on_order_and_machine(files):
