@@ -1,9 +1,9 @@
 """Controllers with knobs from a search: reader of ``tuned.yaml``.
 
 The search (``python -m benchmarks tune``) uses the same sampler and the same tuning seeds as the
-search over a learned controller's settings; the number of trials is in each entry. Its result is for one environment, on its
-nominal plant or on plants drawn in each episode, and is a separate entry beside the controller as
-published.
+search over a learned controller's settings; the number of trials is in each entry. Its result is
+for one environment, on its nominal plant or on plants drawn in each episode, and is a separate
+entry beside the controller as published.
 """
 
 import math
