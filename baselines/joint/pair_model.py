@@ -305,8 +305,7 @@ class PairModel:
 
         Angles and torques may have any shape; friction forces ``drag`` [N] have one axis more, of
         length 2. The force of a muscle is that of the static law less its friction, and zero if
-        this is negative (slack). If a torque is out of reach, the
-        setpoint is the end of its range.
+        this is negative (slack). If a torque is out of reach, the setpoint is the end of its range.
         """
         found = np.empty(angle.size)
         given = (np.ascontiguousarray(angle).ravel(), np.ascontiguousarray(torque).ravel())

@@ -14,9 +14,9 @@ where ``d`` is the disturbance torque, and ``e = r - q`` the error predicted for
 setpoint takes effect. ``M`` is the mass matrix of the straight joints; in an arm it couples the
 joints. The static law less the friction of each muscle gives the setpoints at which the muscles
 exert this torque at the angle ``r``; a muscle whose friction exceeds the force of its static law is
-slack and exerts no force. The difference between the two pressures
-of a joint, which changes by at most twice the rate limit, follows the best rate-limited path
-towards the differences of those setpoints (:mod:`baselines.predictive.rate_limited`).
+slack and exerts no force. The difference between the two pressures of a joint, which changes by at
+most twice the rate limit, follows the best rate-limited path towards the differences of those
+setpoints (:mod:`baselines.predictive.rate_limited`).
 
 A Kalman filter compares the sensed angle with the motion of the nominal joint under the estimated
 pressures, and corrects angle, rate and ``d`` (pannocchia2003): an undeclared payload, a wrong force

@@ -56,11 +56,9 @@ def chance(interval: Interval | None) -> str:
 def percent(interval: Interval) -> str:
     """Return a share with its interval in percent, signs and all."""
     value, low, high = map(_percent, (interval.value, interval.low, interval.high))
-    return (
-        f"{value} % [{low}, {high}]"
-        if np.isfinite([interval.low, interval.high]).all()
-        else f"{value} %"
-    )
+    if not np.isfinite([interval.low, interval.high]).all():
+        return f"{value} %"
+    return f"{value} % [{low}, {high}]"
 
 
 def reduction_words(interval: Interval) -> str:

@@ -6,6 +6,7 @@ row. An oracle has no row: it is not in the catalogue, and it is never ranked.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -159,7 +160,8 @@ def _actions_of(
     try:
         model, base = model_of(track.env, scenario, env), env.unwrapped
         made = make_controller(controller, model, base.signals, base.action_signals)
-        episodes = [rollout.run(env, made, seed) for seed in seeds]
+        batches = partial(make_batch, track.env, scenario.kwargs)
+        episodes = rollout.run_all(batches, env, made, seeds)
     finally:
         env.close()
     for seed, episode in zip(seeds, episodes, strict=True):

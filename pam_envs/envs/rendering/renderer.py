@@ -9,6 +9,7 @@ import os
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from pam_envs.envs.rendering import scene
 SIZE = (800, 600)
 SCALE = 2  # everything is drawn this many times larger and smoothed down, for anti-aliased edges
 FINE = 3  # text is drawn this many times larger still, so that gaps between letters are even
-LABELS = 300  # texts that are kept
+LABELS = 300  # texts that are kept: most are those of the last picture
 STRIP_SECONDS = 8.0
 LOOP_SAMPLES = 1500
 WINDOW_FPS = 50  # pictures per second in the window, at the pace of the plant
@@ -48,7 +49,7 @@ class Canvas:
         self.pygame.font.init()
         self.surface = self.pygame.Surface((SIZE[0] * SCALE, SIZE[1] * SCALE))
         self._fonts: dict[int, Any] = {}
-        self._labels: dict[tuple[str, scene.Color, int], Any] = {}
+        self._label = lru_cache(maxsize=LABELS)(self._drawn)
 
     def clear(self) -> None:
         """Start a new picture."""
@@ -106,18 +107,13 @@ class Canvas:
         shift = {"left": 0.0, "center": 0.5, "right": 1.0}[align] * drawn.get_width()
         self.surface.blit(drawn, (place[0] * SCALE - shift, place[1] * SCALE))
 
-    def _label(self, words: str, color: scene.Color, size: int) -> Any:
-        """Return a surface with a text; most texts are those of the last picture."""
-        key = (words, color, size)
-        if key not in self._labels:
-            if len(self._labels) >= LABELS:
-                self._labels.clear()
-            if size not in self._fonts:
-                self._fonts[size] = self.pygame.font.Font(None, round(1.45 * size * SCALE * FINE))
-            fine = self._fonts[size].render(words, True, color)
-            pixels = [round(length / FINE) for length in fine.get_size()]
-            self._labels[key] = self.pygame.transform.smoothscale(fine, pixels)
-        return self._labels[key]
+    def _drawn(self, words: str, color: scene.Color, size: int) -> Any:
+        """Return a surface with a text."""
+        if size not in self._fonts:
+            self._fonts[size] = self.pygame.font.Font(None, round(1.45 * size * SCALE * FINE))
+        fine = self._fonts[size].render(words, True, color)
+        pixels = [round(length / FINE) for length in fine.get_size()]
+        return self.pygame.transform.smoothscale(fine, pixels)
 
     def picture(self) -> Any:
         """Return the surface in its final size."""

@@ -8,7 +8,7 @@ from benchmarks.bounds.copies import Copies
 from benchmarks.bounds.oracle import targets_of
 from benchmarks.bounds.run import play
 from benchmarks.runs.rollout import run
-from benchmarks.scenarios.scenario import ScenarioSet, available
+from benchmarks.scenarios.scenario import Scenario, ScenarioSet, available
 from benchmarks.scenarios.scenario_env import make_batch, make_env
 from benchmarks.scoring.group import Record
 from benchmarks.scoring.groups.elbow import of_elbow
@@ -34,10 +34,16 @@ def test_copies_run_ahead_as_the_environment_does():
                 assert np.array_equal(ahead[key][t], np.repeat(info[key][:, None], 20, axis=1))
 
 
-def test_no_controller_passes_the_bound_of_the_oracle():
+def short_steps() -> tuple[ScenarioSet, Scenario]:
+    """Return the nominal track of positioning and its scenario with steps, for 5 s."""
     track: ScenarioSet = available()["positioning_nominal"]
     scenario = next(s for s in track.scenarios() if s.name == "maxwell_slip_2.55kg_steps")
     scenario.kwargs["episode_seconds"] = 5.0
+    return track, scenario
+
+
+def test_no_controller_passes_the_bound_of_the_oracle():
+    track, scenario = short_steps()
     seeds = (900_001, 900_002)
     bound = play(track, scenario, seeds, horizon=50)
     env = make_env(track.env, scenario.kwargs)
@@ -51,9 +57,7 @@ def test_no_controller_passes_the_bound_of_the_oracle():
 
 
 def test_actions_of_a_controller_improve_the_search_with_a_short_horizon():
-    track: ScenarioSet = available()["positioning_nominal"]
-    scenario = next(s for s in track.scenarios() if s.name == "maxwell_slip_2.55kg_steps")
-    scenario.kwargs["episode_seconds"] = 5.0
+    track, scenario = short_steps()
     env = make_env(track.env, scenario.kwargs)
     base = env.unwrapped
     made = make_controller("predictive_inverse", base.plant, base.signals, base.action_signals)
