@@ -368,13 +368,16 @@ class KneeAnticipation(RowController):
         return np.asarray(before & after)
 
     def _place(self, plan: Plan, before: Array) -> Array:
-        """Return the present in the nominal stride, until the whole stride is in the plan."""
+        """Return the present in the nominal stride; it is sought until that is in the plan."""
+        if self.stride is None:
+            return before
         memory, step = self.phase.memory, plan.seen.step
-        if self.stride is None or np.all(step + memory.ahead[-1] > self.stride.length):
+        sought = step + memory.ahead[-1] <= self.stride.length
+        if not np.any(sought):
             return before
         ahead = memory.ahead[1:] if len(memory.ahead) > 1 else memory.ahead
         seen, _ = memory.read(plan.seen, step[:, None] + ahead.astype(float))
-        return self.stride.phase(seen, ahead).astype(float)
+        return self.stride.phase(seen, ahead, sought, before)
 
     def _ahead(self, now: AnticipationState, ends: Array) -> tuple[Array, Rows]:
         """Return the planned samples after ``ends`` periods, and where they are known.

@@ -9,12 +9,15 @@ fits the previewed samples best.
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.core.controller import Rows
 from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
+from pam_envs.kernels.build import entry
 from pam_envs.mechanics.leg import centre_of_pressure
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.references.gait import NATURAL_STRIDE, gait_curves, vertical_load
@@ -62,7 +65,7 @@ class NominalStride:
         torque = np.where(stance, filtered(np.tile(torque, 2))[points:], 0.0)
         return np.stack([np.maximum(plant.lever.tension(torque, angle), 0.0), angle])
 
-    def phase(self, seen: Array, ahead: NDArray[np.int64]) -> NDArray[np.int64]:
+    def phase(self, seen: Array, ahead: NDArray[np.int64], sought: Rows, before: Array) -> Array:
         """Return the point of the stride at present, shape (n_env,).
 
         Parameters
@@ -71,14 +74,37 @@ class NominalStride:
             Previewed tension [N] and angle [rad].
         ahead : ndarray of int, shape (n_samples,)
             Times of the samples from the present [control periods].
+        sought : ndarray of bool, shape (n_env,)
+            Whether a point is sought.
+        before : ndarray, shape (n_env,)
+            Points of the others.
         """
         at = np.arange(self.samples.shape[1])[:, None] + ahead
-        off = seen[:, :, None] - self.read(at)
-        off /= np.array([TENSION_MISFIT, ANGLE_MISFIT])[:, None, None]
-        return np.argmin(np.add.reduce(off**2, axis=(1, 3)), axis=1)
+        scale = np.array([TENSION_MISFIT, ANGLE_MISFIT])
+        found = np.array(before, float)
+        fit_rows(np.ascontiguousarray(seen), self.read(at), scale, sought, found)
+        return found
 
     def read(self, points: NDArray[np.generic]) -> Array:
         """Return tension [N] and angle [rad] at the nearest points of the stride, (2, ...)."""
         count = self.samples.shape[1]
         near = np.floor(points * (count / self.length) + 0.5).astype(np.int64)
         return self.samples[:, near % count]
+
+
+@entry
+def fit_rows(seen: Array, planned: Array, scale: Array, sought: Any, found: Array) -> None:
+    """Write the first point whose planned samples, (2, n_points, n_samples), fit a row best."""
+    for i in range(len(seen)):
+        least = np.inf
+        for point in range(planned.shape[1] if sought[i] else 0):
+            misfit = 0.0
+            for c in range(len(scale)):
+                if misfit >= least:
+                    break
+                for k in range(planned.shape[2]):
+                    off = (seen[i, c, k] - planned[c, point, k]) / scale[c]
+                    misfit += off * off
+            if misfit < least:
+                least = misfit
+                found[i] = float(point)

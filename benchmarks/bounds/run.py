@@ -161,7 +161,7 @@ def _actions_of(
         model, base = model_of(track.env, scenario, env), env.unwrapped
         made = make_controller(controller, model, base.signals, base.action_signals)
         batches = partial(make_batch, track.env, scenario.kwargs)
-        episodes = rollout.run_all(batches, env, made, seeds)
+        (episodes,) = rollout.run_all([rollout.Part(batches, env, seeds)], made)
     finally:
         env.close()
     for seed, episode in zip(seeds, episodes, strict=True):

@@ -1,11 +1,12 @@
 """Cells of the checkpoint: one controller in one scenario, over its public or its audit seeds.
 
-The cells of one policy in one scenario form a group, whose episodes are the rows of one batch. The
-record of a cell does not depend on its group.
+The cells of one policy in one track form a group, whose episodes are the rows of one batch wherever
+the controllers of its scenarios are the same one. The record of a cell does not depend on its
+group.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -16,7 +17,8 @@ from benchmarks.identity import artefacts, trainings
 from benchmarks.identity.audit import Audit
 from benchmarks.identity.hashing import arrays_digest, digest
 from benchmarks.runs import controllers, knowledge, provenance, rollout, traces
-from benchmarks.runs.controllers import Entrant
+from benchmarks.runs.controllers import Controller, Entrant
+from benchmarks.runs.rollout import Episode
 from benchmarks.scenarios.scenario import Scenario, ScenarioSet
 from benchmarks.scenarios.scenario_env import (
     drawn_plant,
@@ -29,6 +31,8 @@ from benchmarks.scoring.metrics import scores_of
 
 SCHEMA = 3
 PUBLIC, AUDIT = "public", "audit"
+INFORMED_SEEDS = {PUBLIC: 1, AUDIT: 3}
+"""Seeds a scenario of a controller that is designed from the plant of each episode."""
 PROBED_STEPS = 250  # number of steps of the episode that measures the use of the preview
 
 
@@ -77,23 +81,30 @@ class Cell:
 
 
 def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -> list[Cell]:
-    """Return the cells of a row by training seed and scenario, public ones first, then audit."""
+    """Return the cells of a row by training seed and scenario, public ones first, then audit.
+
+    A controller that is designed from the plant of each episode has the first of the seeds only.
+    """
     scenarios, public = track.scenarios(), track.seeds
+    most = INFORMED_SEEDS if knowledge.is_informed(entrant) else dict[str, int]()
+    kept, audited = most.get(PUBLIC), most.get(AUDIT)
     probed = next((s.name for s in scenarios if not s.rests), scenarios[0].name)
     runs = [(seed, s) for seed in entrant.training_seeds for s in scenarios]
     first = (entrant.training_seeds[0], probed)
     cells = [
-        Cell(entrant, track, s, seed, PUBLIC, public[s.name], (seed, s.name) == first)
+        Cell(entrant, track, s, seed, PUBLIC, public[s.name][:kept], (seed, s.name) == first)
         for seed, s in runs
     ]
     if found is not None:
-        cells += [Cell(entrant, track, s, seed, AUDIT, found.seeds[s.name]) for seed, s in runs]
+        cells += [
+            Cell(entrant, track, s, seed, AUDIT, found.seeds[s.name][:audited]) for seed, s in runs
+        ]
     return cells
 
 
 @dataclass(frozen=True)
 class Group:
-    """One or more cells that differ only in their seeds."""
+    """One or more cells of a policy in a track."""
 
     cells: tuple[Cell, ...]
 
@@ -104,44 +115,125 @@ class Group:
 
 
 def grouped(cells: Iterable[Cell]) -> list[Group]:
-    """Return cells in groups, ordered by their first cells."""
+    """Return cells in groups, ordered by their first cells.
+
+    A controller that is designed from the plant of each episode has a group for each scenario.
+    """
     found: dict[Any, list[Cell]] = defaultdict(list)
     for cell in cells:
-        found[cell.entrant, cell.track, cell.scenario.name, cell.training_seed].append(cell)
+        part = cell.scenario.name if knowledge.is_informed(cell.entrant) else None
+        found[cell.entrant, cell.track, part, cell.training_seed].append(cell)
     return [Group(tuple(members)) for members in found.values()]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Environment and nominal model of cells in one scenario."""
+
+    cells: tuple[Cell, ...]
+    env: Any
+    model: Any
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """Seeds of all cells."""
+        return tuple(seed for cell in self.cells for seed in cell.seeds)
+
+    @property
+    def design(self) -> tuple[Any, ...]:
+        """What a controller is designed from."""
+        base = self.env.unwrapped
+        return self.model.digest(), base.signals, base.action_signals
+
+
+def scenes_of(cells: Iterable[Cell]) -> list[Scene]:
+    """Return the scenes of cells, ordered by their first cells."""
+    found: dict[str, list[Cell]] = defaultdict(list)
+    for cell in cells:
+        found[cell.scenario.name].append(cell)
+    scenes = []
+    for members in found.values():
+        track, scenario = members[0].track, members[0].scenario
+        env = make_env(track.env, scenario.kwargs)
+        scenes.append(Scene(tuple(members), env, model_of(track.env, scenario, env)))
+    return scenes
+
+
+Design = Callable[[Scene], Controller]
+
+
+def run_scenes(
+    scenes: Sequence[Scene], design: Design
+) -> Iterator[tuple[Scene, Controller, list[Episode]]]:
+    """Yield each scene with its controller and its episodes.
+
+    Scenes with the same nominal model and signals are rows of one batch under one controller.
+    """
+    alike: dict[Any, list[Scene]] = defaultdict(list)
+    for scene in scenes:
+        alike[scene.design].append(scene)
+    for members in alike.values():
+        controller = design(members[0])
+        parts = [
+            rollout.Part(
+                partial(make_batch, scene.cells[0].track.env, scene.cells[0].scenario.kwargs),
+                scene.env,
+                scene.seeds,
+            )
+            for scene in members
+        ]
+        for scene, episodes in zip(members, rollout.run_all(parts, controller), strict=True):
+            yield scene, controller, episodes
 
 
 def compute(group: Group) -> dict[str, dict[str, Any]]:
     """Run the episodes of a group and return each cell's record by its key."""
     first = group.cells[0]
-    entrant, track = first.entrant, first.track
-    env = make_env(track.env, first.scenario.kwargs)
-    model = model_of(track.env, first.scenario, env)
-    controller = controllers.make(entrant, model, env, training_seed=first.training_seed)
+    entrant, seed = first.entrant, first.training_seed
+    scenes = scenes_of(group.cells)
+
+    def design(scene: Scene) -> Controller:
+        return controllers.make(entrant, scene.model, scene.env, training_seed=seed)
+
+    if knowledge.is_informed(entrant) and scenes[0].env.unwrapped.setup.drawn:
+        (scene,) = scenes
+        made = iter([(scene, design(scene), informed_episodes(scene))])
+    else:
+        made = run_scenes(scenes, design)
+    records: dict[str, dict[str, Any]] = {}
+    for scene, controller, episodes in made:
+        records |= _records(scene, controller, episodes)
+    for scene in scenes:
+        scene.env.close()
+    return {cell.key: records[cell.key] for cell in group.cells}
+
+
+def _records(
+    scene: Scene, controller: Controller, made: Sequence[Episode]
+) -> dict[str, dict[str, Any]]:
+    """Return the records of a scene's cells by their keys."""
+    first, env = scene.cells[0], scene.env
     said: dict[str, Any] = {
         "schema": SCHEMA,
-        "env": track.env,
-        "controller": entrant.name,
-        "track": track.name,
+        "env": first.track.env,
+        "controller": first.entrant.name,
+        "track": first.track.name,
         "scenario": first.scenario.name,
         "training_seed": first.training_seed,
         "plant_digest": env.unwrapped.plant.digest(),
-        "model_digest": model.digest(),
-        **knowledge.of_plant(entrant, controller, model, env),
+        "model_digest": scene.model.digest(),
+        **knowledge.of_plant(first.entrant, controller, scene.model, env),
     }
-    if entrant.files:
+    if first.entrant.files:
         said["card"] = trainings.card_record(controller)
-    informed = knowledge.is_informed(entrant) and env.unwrapped.setup.drawn
-    run = informed_episodes(group, env) if informed else episodes_of(group, env, controller)
-    episodes = iter(run)
-    records = {}
-    for cell in group.cells:
+    episodes, records = iter(made), {}
+    for cell in scene.cells:
         record = {**said, "split": cell.split}
         own = [next(episodes) for _ in cell.seeds]
         numbered = zip(cell.seeds, own, strict=True)
         record["episodes"] = [episode_record(cell, seed, episode) for seed, episode in numbered]
         if cell.drawn and len(own[0].actions):
-            picture = (cell.scenario.name, cell.seeds[0], own[0].signals, track.content)
+            picture = (cell.scenario.name, cell.seeds[0], own[0].signals, cell.track.content)
             record["traces"] = [traces.of_episode(*picture, cell.training_seed)]
         if cell.probe:
             part = replace(own[0], observations=own[0].observations[:PROBED_STEPS])
@@ -154,29 +246,20 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
             "predict_us": dict(zip(("median", "p99"), times, strict=True)),
         }
         records[cell.key] = record
-    env.close()
     return records
 
 
-def episodes_of(group: Group, env: Any, controller: Any) -> list[rollout.Episode]:
-    """Return the episodes of a group, cell by cell; ``env`` is its environment alone."""
-    first = group.cells[0]
-    batches = partial(make_batch, first.track.env, first.scenario.kwargs)
-    seeds = [seed for cell in group.cells for seed in cell.seeds]
-    return rollout.run_all(batches, env, controller, seeds)
-
-
-def informed_episodes(group: Group, env: Any) -> list[rollout.Episode]:
+def informed_episodes(scene: Scene) -> list[Episode]:
     """Return the episodes of a controller that is designed from the plant drawn in each."""
-    made = []
-    for seed in (seed for cell in group.cells for seed in cell.seeds):
+    made, env = [], scene.env
+    for seed in scene.seeds:
         env.reset(seed=seed)
-        controller = controllers.make(group.cells[0].entrant, drawn_plant(env), env)
+        controller = controllers.make(scene.cells[0].entrant, drawn_plant(env), env)
         made.append(rollout.run(env, controller, seed))
     return made
 
 
-def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str, Any]:
+def episode_record(cell: Cell, seed: int, episode: Episode) -> dict[str, Any]:
     """Return the scores of an episode; one that did not reach its end gets the worst case."""
     saturated = episode.signals.get("saturated", np.zeros(0))
     return {

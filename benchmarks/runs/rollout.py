@@ -16,7 +16,7 @@ from sweeps.worker import is_needed
 
 LONGEST = 300  # largest number of characters of a message in a row
 
-REPLAYED = 100  # steps of an episode that are repeated with a single row after a run in a batch
+REPLAYED = 50  # steps of an episode that are repeated with a single row after a run in a batch
 
 Watch = Callable[[Any], None]
 
@@ -104,32 +104,42 @@ def _named(keys: Sequence[str], table: Array, models: Array) -> dict[str, Array]
     }
 
 
-def run_all(
-    make: Callable[[int], Any], env: Any, controller: Controller, seeds: Sequence[int]
-) -> list[Episode]:
-    """Run an episode for each seed, as rows of a batch if that gives the same bits.
+@dataclass(frozen=True)
+class Part:
+    """Episodes of one environment among those of a batch."""
+
+    make: Callable[[int], Any]  # makes the batched environment of a number of rows
+    env: Any  # the same environment alone
+    seeds: Sequence[int]
+
+
+def run_all(parts: Sequence[Part], controller: Controller) -> list[list[Episode]]:
+    """Run an episode for each seed of each part, as rows of one batch if that gives the same bits.
 
     A row of a batch is the single environment to the last bit, and a row of a controller should be.
-    This is checked: the first answers in the first and the last row are computed again, alone.
-    If one differs, each episode is a batch of its own. If the controller takes no batch, or raises
-    an error, the episodes are run one by one. A cancelled run raises RuntimeError.
-    ``make`` makes the batched environment of a number of rows; ``env`` is the same one alone.
+    This is checked: the first answers in the first row of each part, and in the last row of all,
+    are computed again, alone. If one differs, each episode is a batch of its own. If the controller
+    takes no batch, or raises an error, the episodes are run one by one. A cancelled run raises
+    RuntimeError.
     """
-    for groups in ([list(seeds)], [[seed] for seed in seeds]):
-        made: list[Episode] = []
-        for group in groups:
-            _check_needed()
-            try:
-                made += _rows(make(len(group)), controller, group)
-            except _NotAsRows:  # the single run reports the error
-                break
-        else:
-            return made
-    episodes = []
-    for seed in seeds:
+    alone = [replace(part, seeds=[seed]) for part in parts for seed in part.seeds]
+    try:
         _check_needed()
-        episodes.append(run(env, controller, seed))
-    return episodes
+        return _rows(parts, controller)
+    except _NotAsRows:
+        pass
+    made: list[Episode] = []
+    try:
+        for part in alone:
+            _check_needed()
+            made += _rows([part], controller)[0]
+    except _NotAsRows:  # the single run reports the error
+        made = []
+        for part in alone:
+            _check_needed()
+            made.append(run(part.env, controller, part.seeds[0]))
+    episodes = iter(made)
+    return [[next(episodes) for _ in part.seeds] for part in parts]
 
 
 def _check_needed() -> None:
@@ -150,60 +160,95 @@ def _batch_refused() -> Iterator[None]:
         raise _NotAsRows from error
 
 
-def _rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode]:
+def _rows(parts: Sequence[Part], controller: Controller) -> list[list[Episode]]:
     """Return the episodes as rows of a batch; raise where they differ from single ones."""
-    episodes = _run_rows(batch, controller, seeds)
-    batch.close()
+    batches = [part.make(len(part.seeds)) for part in parts]
+    episodes = _run_rows(batches, [list(part.seeds) for part in parts], controller)
+    for batch in batches:
+        batch.close()
     seconds: list[Array] = []
-    for row in sorted({0, len(seeds) - 1}):
+    repeated = [own[0] for own in episodes]
+    if len(episodes[-1]) > 1:
+        repeated.append(episodes[-1][-1])
+    for episode in repeated:
         with _batch_refused():
-            alone, spent = _timed(controller, episodes[row].observations[:REPLAYED])
-        together = episodes[row].actions[:REPLAYED]
+            alone, spent = _timed(controller, episode.observations[:REPLAYED])
+        together = episode.actions[:REPLAYED]
         if alone.dtype != together.dtype or not np.array_equal(alone, together, equal_nan=True):
             raise _NotAsRows
         seconds.append(spent)
-    return [replace(episode, seconds=np.concatenate(seconds)) for episode in episodes]
+    times = np.concatenate(seconds)
+    return [[replace(episode, seconds=times) for episode in own] for own in episodes]
 
 
-def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode]:
-    """Step until every row has ended once; return the first episode of each, without times."""
-    count = len(seeds)
-    observation, report = batch.reset(seed=list(seeds))
-    keys = tuple(report)
+def _run_rows(
+    batches: Sequence[Any], seeds: Sequence[list[int]], controller: Controller
+) -> list[list[Episode]]:
+    """Step until every row has ended once; return the first episode of each, without times.
+
+    The batches are rows of one controller. One whose rows have all ended waits at a start.
+    """
+    runs = [_BatchRun(*of_part) for of_part in zip(batches, seeds, strict=True)]
     model_output = getattr(controller, "model_output", None)
-    infos, models, observations, actions = [], [], [], []
-    state, start, running = None, np.ones(count, bool), np.ones(count, bool)
-    lengths, failures = np.zeros(count, np.int64), [""] * count
-    while running.any():
+    ends = np.cumsum([len(own) for own in seeds])
+    state = None
+    while any(run.running.any() for run in runs):
+        observation = np.concatenate([run.observation for run in runs])
+        start = np.concatenate([run.start for run in runs])
         with _batch_refused():
             action, state = controller.predict(observation, state, start, True)
-            models.append(np.reshape(model_output(state) if model_output else [], (count, -1)))
-        if not _acceptable(action, batch):
+            followed = np.reshape(model_output(state) if model_output else [], (ends[-1], -1))
+            if np.shape(action)[:1] != (ends[-1],):
+                raise _NotAsRows
+        split = zip(np.split(action, ends[:-1]), np.split(followed, ends[:-1]), strict=True)
+        for run, (own, outputs) in zip(runs, split, strict=True):
+            if run.running.any():
+                run.step(own, outputs)
+    return [run.episodes() for run in runs]
+
+
+class _BatchRun:
+    """First episodes of the rows of a batched environment, while they run."""
+
+    def __init__(self, batch: Any, seeds: list[int]) -> None:
+        self.batch, count = batch, len(seeds)
+        self.observation, report = batch.reset(seed=seeds)
+        self.keys = tuple(report)
+        self.start, self.running = np.ones(count, bool), np.ones(count, bool)
+        self._lengths, self._failures = np.zeros(count, np.int64), [""] * count
+        self._steps: list[tuple[Array, Array, NDArray[Any], NDArray[Any]]] = []
+
+    def step(self, action: NDArray[Any], outputs: Array) -> None:
+        """Record a step with the controller's action and its model's outputs."""
+        if not _acceptable(action, self.batch):
             raise _NotAsRows
-        after, _, terminated, truncated, report = batch.step(action)
-        start = terminated | truncated
-        table = np.array([report[key] for key in keys])
-        if start.any():  # for a row that has ended, the last observation of that episode
-            table[:, start] = np.array([report["final_info"][key][start] for key in keys])
-        infos.append(table)
-        observations.append(observation)
-        actions.append(action)
-        lengths[running] += 1
-        for row in np.flatnonzero(running & terminated):
-            failures[row] = _ended(table[keys.index("time"), row])
-        observation, running = after, running & ~start
-    signals, followed, seen, given = map(np.array, (infos, models, observations, actions))
-    return [
-        Episode(
-            signals=_named(keys, signals[:n, :, row], followed[:n, row]),
-            observations=seen[:n, row].copy(),
-            actions=given[:n, row].copy(),
-            seconds=np.zeros(0),
-            period=float(batch.control_period),
-            failure=failures[row],
-        )
-        for row, n in enumerate(lengths)
-    ]
+        after, _, terminated, truncated, report = self.batch.step(action)
+        over = terminated | truncated
+        table = np.array([report[key] for key in self.keys])
+        if over.any():  # for a row that has ended, the last observation of that episode
+            table[:, over] = np.array([report["final_info"][key][over] for key in self.keys])
+        self._steps.append((table, outputs, self.observation, action))
+        self._lengths[self.running] += 1
+        for row in np.flatnonzero(self.running & terminated):
+            self._failures[row] = _ended(table[self.keys.index("time"), row])
+        self.running &= ~over
+        self.observation = after
+        self.start = over if self.running.any() else np.ones_like(over)
+
+    def episodes(self) -> list[Episode]:
+        """Return the episodes, without times."""
+        signals, followed, seen, given = map(np.array, zip(*self._steps, strict=True))
+        return [
+            Episode(
+                signals=_named(self.keys, signals[:n, :, row], followed[:n, row]),
+                observations=seen[:n, row].copy(),
+                actions=given[:n, row].copy(),
+                seconds=np.zeros(0),
+                period=float(self.batch.control_period),
+                failure=self._failures[row],
+            )
+            for row, n in enumerate(self._lengths)
+        ]
 
 
 def _ended(seconds: float) -> str:

@@ -37,10 +37,10 @@ from baselines.core.entry import Bounds, Knobs, Plants
 from baselines.core.tuned import Tuned, tuned_name
 from benchmarks.identity.hashing import digest
 from benchmarks.runs import cells, controllers
+from benchmarks.runs.controllers import Controller
 from benchmarks.scenarios import kinds
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
-from benchmarks.scenarios.scenario_env import make_env, model_of
 from benchmarks.scoring.metrics import COST_FLOOR, COST_RATIO, COSTS, headline_of
 from pam_envs.envs.registration import full_id
 from pam_envs.files import write_text
@@ -129,24 +129,29 @@ class Course:
         entrant = controllers.find(controller)
         self.track, self.controller = track, controller
         shared = seeds_of(track, episodes)
-        self.cells = [
+        self.scenes = cells.scenes_of(
             cells.Cell(entrant, track, scenario, None, SPLIT, shared[scenario.name])
             for scenario in track.scenarios()
-        ]
-        self.envs = [make_env(track.env, cell.scenario.kwargs) for cell in self.cells]
+        )
 
     def measure(self, knobs: Knobs) -> Measured:
         """Run all episodes with the controller's knobs at these factors."""
-        kinds: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
-        for cell, env in zip(self.cells, self.envs, strict=True):
-            model, base = model_of(self.track.env, cell.scenario, env), env.unwrapped
+
+        def design(scene: cells.Scene) -> Controller:
+            model, base = scene.model, scene.env.unwrapped
             given = (model, base.signals, base.action_signals)
-            made = catalogue.make_controller(self.controller, *given, knobs=knobs)
-            episodes = cells.episodes_of(cells.Group((cell,)), env, made)
-            kinds[str(cell.scenario.kwargs.get("reference", ""))] += [
+            return catalogue.make_controller(self.controller, *given, knobs=knobs)
+
+        found = {}
+        for scene, _, episodes in cells.run_scenes(self.scenes, design):
+            (cell,) = scene.cells
+            found[cell.scenario.name] = [
                 cells.episode_record(cell, seed, episode)
                 for seed, episode in zip(cell.seeds, episodes, strict=True)
             ]
+        kinds: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
+        for scenario in self.track.scenarios():
+            kinds[str(scenario.kwargs.get("reference", ""))] += found[scenario.name]
         return measured(kinds, headline_of(self.track.content))
 
 

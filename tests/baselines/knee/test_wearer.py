@@ -7,7 +7,7 @@ import pytest
 
 from baselines.core.entry import Spec
 from baselines.knee.anticipation import make_knee_anticipation
-from baselines.knee.stride import NominalStride
+from baselines.knee.stride import ANGLE_MISFIT, TENSION_MISFIT, NominalStride
 from baselines.knee.wearer import WearerModel
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from tests.baselines.conftest import built, last_state, make_env, rms, rollout
@@ -91,7 +91,7 @@ def test_nominal_stride_is_the_planned_one(name):
     off, places = [], []
     for step in range(300):
         seen = controller._samples(observation)[:, :, 1:]
-        place = stride.phase(seen, ahead[1:])
+        place = stride.phase(seen, ahead[1:], np.ones(1, bool), np.zeros(1))
         off.append(seen[0, :, -1] - stride.read(place[:, None] + ahead[-1])[:, 0, 0])
         places.append(place[0] - step)
         observation, *_ = env.step(env.action_space.low)
@@ -99,6 +99,21 @@ def test_nominal_stride_is_the_planned_one(name):
     tension, angle = np.abs(off).T
     assert np.median(tension) < 1.0
     assert angle.max() < 0.01
+
+
+def test_point_of_the_stride_is_the_one_of_least_misfit():
+    stride = NominalStride(KneeOrthosis.on_leg("walk"))
+    ahead, rng = np.arange(5, 60, 5), np.random.default_rng(0)
+    true = np.array([40.0, 333.0, 7.0])
+    noise = rng.normal(0.0, 1.0, (3, 2, len(ahead))) * np.array([5.0, 0.005])[:, None]
+    seen = stride.read(true[:, None] + ahead).swapaxes(0, 1) + noise
+    every = np.arange(stride.samples.shape[1])[:, None] + ahead
+    scale = np.array([TENSION_MISFIT, ANGLE_MISFIT])[:, None, None]
+    misfit = (((seen[:, :, None] - stride.read(every)) / scale) ** 2).sum(axis=(1, 3))
+    sought = np.array([True, True, False])
+    found = stride.phase(seen, ahead, sought, np.array([0.0, 0.0, 91.5]))
+    assert list(found) == [*np.argmin(misfit[:2], axis=1), 91.5]
+    assert np.abs(found[:2] - true[:2]).max() <= 3.0
 
 
 def test_unseen_stride_continues_the_preview():

@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 
+from benchmarks.identity import audit
 from benchmarks.identity.hashing import canonical_text
 from benchmarks.runs import cells, provenance, rollout
 from benchmarks.runs.controllers import find
@@ -64,17 +65,49 @@ def test_record_does_not_depend_on_the_cells_of_its_group(track, controller):
         assert [e["seed"] for e in alone["episodes"]] == list(cell.seeds)
 
 
-def test_group_is_of_one_policy_in_one_scenario(track):
+def test_group_is_of_one_policy_in_one_track(track):
     entrant, scenario = find("low"), track.scenarios()[0]
     plain = cells.Cell(entrant, track, scenario, seeds=(1,))
+    beside = dataclasses.replace(plain, scenario=track.scenarios()[1])
     other = [
         dataclasses.replace(plain, training_seed=3),
-        dataclasses.replace(plain, scenario=track.scenarios()[1]),
         dataclasses.replace(plain, entrant=find("middle")),
     ]
     audited = [dataclasses.replace(c, split=cells.AUDIT, seeds=(2,)) for c in (plain, *other)]
-    made = cells.grouped([plain, *other, *audited])
-    assert [group.cells for group in made] == [*zip([plain, *other], audited, strict=True)]
+    made = cells.grouped([plain, *other, beside, *audited])
+    own, *rest = [group.cells for group in made]
+    assert own == (plain, beside, audited[0])
+    assert rest == [*zip(other, audited[1:], strict=True)]
+
+
+def test_scenarios_of_one_controller_are_rows_of_one_batch(monkeypatch):
+    track, sizes = scenarios.available()["joint_nominal"], []
+    (group,) = cells.grouped(cells.cells_of(find("joint_pid"), track))
+    run_all = rollout.run_all
+
+    def noted(parts, controller):
+        sizes.append([len(part.seeds) for part in parts])
+        return run_all(parts, controller)
+
+    monkeypatch.setattr(rollout, "run_all", noted)
+    records = cells.compute(group)
+    assert [*records] == [cell.key for cell in group.cells]
+    names = [record["scenario"] for record in records.values()]
+    assert names == [scenario.name for scenario in track.scenarios()]
+    plants = {record["model_digest"] for record in records.values()}
+    assert len(sizes) == len(plants) < len(names)
+    assert sum(map(len, sizes)) == len(names)
+
+
+def test_informed_controller_has_the_first_seeds_and_a_group_for_each_scenario():
+    track = scenarios.available()["joint_randomised"]
+    entrant = find("joint_inverse_ahead_informed")
+    salt = audit.find(find("joint_inverse_ahead"), track)
+    made = cells.cells_of(entrant, track, salt)
+    for cell in made:
+        whole = track.seeds if cell.split == cells.PUBLIC else salt.seeds
+        assert cell.seeds == whole[cell.scenario.name][: cells.INFORMED_SEEDS[cell.split]]
+    assert len(cells.grouped(made)) == len(track.scenarios())
 
 
 def test_cancelled_cell_is_stopped(track, monkeypatch):

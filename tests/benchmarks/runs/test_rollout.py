@@ -1,6 +1,7 @@
 """Episodes: failures of the controller, errors of the environment, and rows of a batch."""
 
 from functools import partial
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -98,9 +99,21 @@ class Rows:
 
 def compared(env_id, kwargs, controller, seeds=SEEDS):
     """Return episodes run together, after comparing them with single ones."""
-    env, batches = make_env(env_id, kwargs), partial(make_batch, env_id, kwargs)
-    together = rollout.run_all(batches, env, controller, seeds)
-    for episode, seed in zip(together, seeds, strict=True):
+    return compared_parts([part_of(env_id, kwargs, seeds)], controller)[0]
+
+
+def part_of(env_id, kwargs, seeds=SEEDS, make=None):
+    """Return the episodes of an environment with these arguments as a part of a batch."""
+    made = make or partial(make_batch, env_id, kwargs)
+    return rollout.Part(made, make_env(env_id, kwargs), seeds)
+
+
+def compared_parts(parts, controller):
+    """Return episodes of parts run together, after comparing them with single ones."""
+    together = rollout.run_all(parts, controller)
+    assert [len(own) for own in together] == [len(part.seeds) for part in parts]
+    whole = [(part.env, seed) for part in parts for seed in part.seeds]
+    for episode, (env, seed) in zip(chain(*together), whole, strict=True):
         alone = rollout.run(env, controller, seed)
         assert (episode.failure, episode.period) == (alone.failure, alone.period)
         assert list(episode.signals) == list(alone.signals)
@@ -127,7 +140,8 @@ def test_rows_of_a_batch_are_single_episodes_to_the_bit(env_id, name, kwargs, mo
     controller = controllers.make(controllers.find(name), env.unwrapped.plant, env)
     compared(env_id, kwargs, controller)
     monkeypatch.setattr(rollout, "run", None)  # not needed
-    assert len(rollout.run_all(partial(make_batch, env_id, kwargs), env, controller, (3, 4))) == 2
+    (episodes,) = rollout.run_all([part_of(env_id, kwargs, (3, 4))], controller)
+    assert len(episodes) == 2
 
 
 class ByRow:
@@ -141,13 +155,14 @@ class ByRow:
 
 def test_controller_that_acts_by_row_gets_batches_of_one(monkeypatch):
     env_id = "PAM/MusclePositioning-v0"
-    env, controller = make_env(env_id, SHORT), ByRow()
+    controller = ByRow()
     first, *others = compared(env_id, SHORT, controller)
     assert all(np.array_equal(first.actions, other.actions) for other in others)
     monkeypatch.setattr(rollout, "run", None)  # not needed
     rows = []
     batches = partial(make_batch, env_id, SHORT)
-    rollout.run_all(lambda n: rows.append(n) or batches(n), env, controller, (3, 4))
+    noted = part_of(env_id, SHORT, (3, 4), lambda n: rows.append(n) or batches(n))
+    rollout.run_all([noted], controller)
     assert rows == [2, 1, 1]
 
 
@@ -159,6 +174,33 @@ def test_controller_that_acts_by_row_gets_batches_of_one(monkeypatch):
 def test_controller_whose_rows_depend_on_each_other_is_run_alone(controller, batches):
     compared("PAM/MusclePositioning-v0", SHORT, controller)
     assert controller.batches == batches
+
+
+def test_parts_of_a_batch_end_independently():
+    env_id = "PAM/MusclePositioning-v0"
+    steps = {**SHORT, "reference": "steps"}
+    parts = [
+        part_of(env_id, SHORT, (5, 2, 9)),
+        part_of(env_id, {**steps, "episode_seconds": 3.0}, (2,)),
+        part_of(env_id, {**steps, "randomize": True}, (4, 4)),
+    ]
+    controller = Rows()
+    first, second, third = compared_parts(parts, controller)
+    lengths = [{len(episode.actions) for episode in own} for own in (first, second, third)]
+    assert lengths == [{20}, {300}, {20}]
+    assert controller.batches == 300
+    signals = rollout.run_all([parts[1]], controller)[0][0].signals
+    assert all(np.array_equal(second[0].signals[name], signals[name]) for name in signals)
+
+
+def test_one_part_whose_rows_are_not_its_own_is_found():
+    """The mean over all rows differs from a row in the second part alone."""
+    env_id = "PAM/MusclePositioning-v0"
+    parts = [part_of(env_id, SHORT, (seed,)) for seed in (5, 2)]
+    controller = Rows(mixed=1.0)
+    together = [*chain(*compared_parts(parts, controller))]
+    assert controller.batches == 20
+    assert [len(episode.actions) for episode in together] == [20, 20]
 
 
 def test_rows_of_a_batch_end_independently():
@@ -193,7 +235,7 @@ def test_error_of_the_batch_is_raised():
         return batch
 
     with pytest.raises(ValueError, match="ours"):
-        rollout.run_all(broken, make_env(env_id, SHORT), Rows(), SEEDS)
+        rollout.run_all([part_of(env_id, SHORT, make=broken)], Rows())
 
 
 @pytest.mark.parametrize(
@@ -203,9 +245,8 @@ def test_cancelled_run_ends_before_its_next_episode(controller, answers, monkeyp
     env_id = "PAM/MusclePositioning-v0"
     asked = iter([*[True] * answers, False])
     monkeypatch.setattr(rollout, "is_needed", lambda: next(asked))
-    batches = partial(make_batch, env_id, SHORT)
     with pytest.raises(RuntimeError, match="cancelled"):
-        rollout.run_all(batches, make_env(env_id, SHORT), controller, SEEDS)
+        rollout.run_all([part_of(env_id, SHORT)], controller)
     assert not [*asked]
 
 
