@@ -45,6 +45,7 @@ from baselines.core.controller import (
 from baselines.core.entry import KNEE, Entry, Spec
 from baselines.knee.nominal import KneeObserver, KneeView, make_knee_observer
 from baselines.knee.plan import SCALES, PhaseFilter, Plan
+from baselines.knee.pushed_path import Push, pushed_path
 from baselines.knee.stride import NominalStride
 from baselines.knee.wearer import WearerModel
 from baselines.predictive.preview import PreviewMemory
@@ -61,7 +62,7 @@ UNKNOWN = 0.3
 """Weight of samples of an aperiodic reference beyond its preview."""
 BLOCKS = (1,) * 8 + (2,) * 6 + (4,) * 10
 """Control periods between the nodes of the horizon: 0.6 s."""
-ANGLE_NOISE = 0.01
+ANGLE_NOISE = 0.005
 """Difference [rad] of the path from the plan."""
 TORQUE_NOISE = 0.4
 """Difference [N m] of the torque in stance from the plan."""
@@ -69,16 +70,22 @@ USUAL_STRETCH = 0.05
 """Stretch [m] whose errors of the tension have the weight 1."""
 KEPT = 300.0
 """Time constant [periods] for which the torque keeps its distance from the plan."""
-FILTERED = 0.7
+FILTERED = 0.5
 """Share of a difference of the angle that is attributed to the path in a period."""
 YIELDING = np.array([0.001, 0.03])
 """Weights [rad2] of the nominal deviation in swing and in stance, against those that are sensed."""
-CONTACT = 0.5
-"""Load on the leg at heel contact [1]."""
+LIGHT = 0.05
+"""Load on the leg [1] below which it counts as none."""
 MISMATCH = 0.1
 """Likelihood that the plan is in stance and the wearer not, or the reverse, at the right shift."""
 SPREAD = 0.5**0.5
 """Standard deviation of a stride's beginning over that of durations."""
+EARLY = 0.5
+"""Time [periods] before the first sample of a stance from which a node counts as in stance."""
+FARTHEST = 0.3
+"""Largest predicted deviation of the knee [rad]; about the largest that an episode may have."""
+BESIDE = 0.01
+"""Difference of the angle [rad] from which slopes are computed."""
 ENDS = np.cumsum(BLOCKS).astype(float)
 """Nodes of the horizon [periods] from when a setpoint takes effect."""
 MEMORY = 200.0
@@ -94,6 +101,19 @@ Correction = Callable[[Array], Array]
 Inverse = Callable[[Array, RowsState], Array]
 """From stiffnesses [N/m], (n_env, n_nodes), and the state of the hysteresis when a setpoint takes
 effect, to pressures [Pa]."""
+
+
+class Demand(NamedTuple):
+    """What is demanded at the nodes, each of shape (n_env, n_nodes).
+
+    ``value`` is the torque [N m] in the stance of a gait, to which ``correction`` adds a tension
+    [N], and the stiffness [N/m] of the brace alone. ``weight`` is that of a squared error.
+    """
+
+    stance: Rows
+    value: Array
+    correction: Array
+    weight: Array
 
 
 class AnticipationState(NamedTuple):
@@ -189,21 +209,50 @@ class KneeAnticipation(RowController):
         later = self.observer.nominal.along(arrival.pressures, now.hysteresis)
         ends = arrival.delay[:, None] + ENDS
         planned = self._ahead(now, ends)
-        angle = self._angles_ahead(view, observation, now, arrival, ends, planned[0])
-        stiffness, weight = self._demands(view, observation, now, ends, planned, angle, more)
+        angle, response = self._angles_ahead(view, observation, now, arrival, ends, planned[0])
+        demand = self._demand(view, observation, now, ends, planned, more)
+        stiffness, weight = self._stiffness(demand, angle), self._weight(demand, angle)
         path = (inverse or partial(self._inverse, now.moments))(stiffness, later)
         reach = (arrival.rate * self.bank.period)[:, None] * np.array(BLOCKS, float)
         start = arrival.pressures[-1]
-        best = best_path(start, path, weight, reach)
+        if self.observer.gait:
+            slope = self.observer.nominal.per_stiffness * now.moments[:, :1] / now.moments[:, 1:]
+            push = self._push(now, ends, demand, angle, slope)
+            best, off = pushed_path(start, path, weight, reach, push, response)
+            reached, angle = stiffness + (best - path) / slope, angle + _near(off)
+            most = self.observer.nominal.full_pressure / self.observer.nominal.per_stiffness
+            now = now._replace(torque=self._torque(np.clip(reached, 0.0, most), angle))
+        else:
+            best = best_path(start, path, weight, reach)
         command = arrival.set_point(best[:, 0], self.bank.period)
         command = np.minimum(np.maximum(command, signal.low), signal.high)
         after = now._replace(bank=self.bank.advance(now.bank, command))
-        if self.observer.gait:
-            reached = stiffness + (best - path) / self.observer.nominal.per_stiffness
-            tension = np.maximum(reached, 0.0) * self.observer.nominal.stretch(angle)
-            torque = self.observer.nominal.plant.lever.torque(tension, angle)
-            after = after._replace(torque=torque)
         return encode_action(signal, command, observation), after
+
+    def _torque(self, stiffness: Array, angle: Array) -> Array:
+        """Return the torques [N m] of a muscle of stiffnesses [N/m] at angles [rad]."""
+        tension = np.maximum(stiffness, 0.0) * self.observer.nominal.stretch(angle)
+        return self.observer.nominal.plant.lever.torque(tension, angle)
+
+    def _push(
+        self, now: AnticipationState, ends: Array, demand: Demand, angle: Array, slope: Array
+    ) -> Push:
+        """Return the linear model of the pushed knee at predicted angles [rad].
+
+        ``slope`` is the pressure over the stiffness [Pa m/N].
+        """
+        nominal, lever = self.observer.nominal, self.observer.nominal.plant.lever
+        pairs = zip(ends, now.torque, strict=True)
+        before = np.stack([np.interp(times, times - 1.0, torque) for times, torque in pairs])
+        less, more, wide = angle - BESIDE, angle + BESIDE, 2.0 * BESIDE
+        stiffness = self._stiffness(demand, angle)
+        change = self._stiffness(demand, more) - self._stiffness(demand, less)
+        return Push(
+            excess=self._torque(stiffness, angle) - before,
+            per_pressure=nominal.stretch(angle) * lever.lever_arm(angle) / slope,
+            per_angle=(self._torque(stiffness, more) - self._torque(stiffness, less)) / wide,
+            pressure_per_angle=change / wide * slope,
+        )
 
     def _inverse(self, moments: Array, stiffness: Array, later: RowsState) -> Array:
         """Return the pressures [Pa] of stiffnesses [N/m] for the gain of the moments."""
@@ -278,14 +327,15 @@ class KneeAnticipation(RowController):
     def _angles_ahead(
         self, view: KneeView, observation: ArrayLike, now: AnticipationState, arrival: Arrival,
         ends: Array, planned: Array,
-    ) -> Array:  # fmt: skip
+    ) -> tuple[Array, Array]:  # fmt: skip
         """Return the predicted angles [rad] at the nodes of a gait, (n_env, n_nodes).
 
+        The second array is their response to torques at the nodes (:mod:`baselines.knee.wearer`).
         Until a setpoint of now takes effect the torque is that of the nominal muscle under the
         pressures to come; afterwards that of the path planned in the last period.
         """
         if self.torque is None:
-            return np.zeros_like(ends)
+            return np.zeros_like(ends), np.zeros((*ends.shape, 0))
         nominal, n = self.observer.nominal, len(ends)
         lever, last = nominal.plant.lever, math.ceil(ends.max()) + 1
         times = np.arange(-1.0, last + 2.0)
@@ -302,17 +352,32 @@ class KneeAnticipation(RowController):
             given = lever.torque(tension, middle[:, k])
             torque[:, k] = np.where(k < arrival.delay, given, torque[:, k])
         torque = torque + self._leg.passive(path)[:, :last]
-        sensed = self._leg.load(self.torque.rows(observation)[1])[:, None]
-        begins = stance[:, 2:-1] & ~view.stance[:, None]
-        load = np.where(begins, CONTACT, sensed)
+        load = self._loads_ahead(observation, now, np.arange(last) + 0.5)
         course = self._leg.along(now.wearer[:, :2], torque, load)[..., 0]
         ratio = now.yielding[..., 1] / now.yielding[..., 0]
-        course = course * np.where(stance[:, 1:-1], ratio[:, 1:], ratio[:, :1])
+        scale = np.where(stance[:, 1:-1], ratio[:, 1:], ratio[:, :1])
+        response = self._leg.response(load, scale, ends, arrival.delay)
+        course = course * scale
         whole = np.floor(ends).astype(np.int64)
         low = np.take_along_axis(course, whole, axis=1)
         high = np.take_along_axis(course, whole + 1, axis=1)
         off = low + (ends - whole) * (high - low) + now.wearer[:, 2:]
-        return np.asarray(planned[:, 1] + off)
+        return planned[:, 1] + _near(off), response
+
+    def _loads_ahead(self, observation: ArrayLike, now: AnticipationState, times: Array) -> Array:
+        """Return the loads on the leg [1] after periods, (n_env, n_times).
+
+        They are those of the nominal stride, in proportion to the sensed load until it ends.
+        """
+        assert self.torque is not None and self.stride is not None
+        sensed = self._leg.load(self.torque.rows(observation)[1])
+        here = now.place + now.plan.shift
+        present = self.stride.load(here)
+        load = self.stride.load(here[:, None] + times)
+        both = (sensed > LIGHT) & (present > LIGHT)
+        ratio = np.clip(sensed / np.maximum(present, LIGHT), 0.5, 2.0)
+        same = np.logical_and.accumulate(load > LIGHT, axis=1)
+        return np.where(both[:, None] & same, ratio[:, None] * load, load)
 
     def _likelihood(
         self, view: KneeView, observation: ArrayLike, now: AnticipationState, samples: Array
@@ -330,30 +395,51 @@ class KneeAnticipation(RowController):
         slack = self.observer.nominal.free_tension(angle) <= SMALLEST
         return np.where(((planned | (stance & slack)) == stance)[:, None], fit, sure)
 
-    def _demands(
+    def _demand(
         self, view: KneeView, observation: ArrayLike, now: AnticipationState, ends: Array,
-        planned: tuple[Array, Rows], angle: Array, more: Correction | None,
-    ) -> tuple[Array, Array]:  # fmt: skip
-        """Return stiffnesses [N/m] and weights at the nodes, shape (n_env, n_nodes)."""
+        planned: tuple[Array, Rows], more: Correction | None,
+    ) -> Demand:  # fmt: skip
+        """Return what is demanded at the nodes.
+
+        The nodes up to ``EARLY`` before heel contact are those of the stance that begins.
+        """
         nominal, plan, (samples, known) = self.observer.nominal, now.plan, planned
         weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
-        if not self.observer.gait:
-            return self._brace_stiffness(now, ends, samples[:, 0]), weight
-        assert self.torque is not None
-        lever = nominal.plant.lever
+        if self.torque is None or self.stride is None:
+            reference = self._brace_stiffness(now, ends, samples[:, 0])
+            return Demand(np.ones_like(known), reference, np.zeros_like(ends), weight)
+        lever, place = nominal.plant.lever, (now.place + plan.shift)[:, None]
         here, _ = self.phase.read(plan, np.zeros((len(ends), 1)))
         stance = self._wholly_in_stance(plan, ends, now)
         together = view.stance & self._in_stance(here[:, 0], here[:, 1], now)[:, 0]
         sensed = self.torque.rows(observation)[0]
         excess = np.where(together, sensed - lever.torque(here[:, 0, 0], here[:, 1, 0]), 0.0)
+        soon = self._wholly_in_stance(plan, ends + EARLY, now) & ~stance
+        samples = np.where(soon[:, None], self._ahead(now, ends + EARLY)[0], samples)
         torque = lever.torque(samples[:, 0], samples[:, 1])
         torque = torque + excess[:, None] * np.exp(-ends / KEPT)
-        tension = lever.tension(torque, angle)
+        slack = (nominal.free_tension(samples[:, 1]) <= SMALLEST) & (samples[:, 0] <= SMALLEST)
+        stance = stance | soon | (slack & self.stride.in_stance(place + ends))
+        correction = np.zeros_like(ends)
         if more is not None:
-            tension = tension + more(self.phase.present(plan)[:, None] + ends)
-        stretch, free = nominal.stretch(angle), nominal.free_tension(angle)
-        weight = weight * np.where(stance, 1.0, SWING) * (stretch / USUAL_STRETCH) ** 2
-        return np.where(stance, np.maximum(tension, 0.0), free) / stretch, weight
+            correction = more(self.phase.present(plan)[:, None] + ends)
+        return Demand(stance, torque, correction, weight)
+
+    def _stiffness(self, demand: Demand, angle: Array) -> Array:
+        """Return the demanded stiffnesses [N/m] at angles [rad] of the nodes."""
+        if not self.observer.gait:
+            return demand.value
+        nominal = self.observer.nominal
+        tension = nominal.plant.lever.tension(demand.value, angle) + demand.correction
+        wanted = np.where(demand.stance, np.maximum(tension, 0.0), nominal.free_tension(angle))
+        return np.asarray(wanted / nominal.stretch(angle))
+
+    def _weight(self, demand: Demand, angle: Array) -> Array:
+        """Return the weights of squared errors of the pressure at the nodes."""
+        if not self.observer.gait:
+            return demand.weight
+        usual = self.observer.nominal.stretch(angle) / USUAL_STRETCH
+        return np.asarray(demand.weight * np.where(demand.stance, 1.0, SWING) * usual**2)
 
     def _wholly_in_stance(self, plan: Plan, ends: Array, now: AnticipationState) -> Rows:
         """Return whether the samples on both sides of each node are in stance, (n_env, n_nodes).
@@ -418,6 +504,11 @@ class KneeAnticipation(RowController):
         """Return where planned samples are in stance, shape (n_env, n_times)."""
         free = self.observer.nominal.free_tension(angle)
         return np.asarray(np.abs(tension - free - now.offset[:, None]) > SMALLEST)
+
+
+def _near(deviation: Array) -> Array:
+    """Return deviations [rad] within the largest one."""
+    return np.clip(deviation, -FARTHEST, FARTHEST)
 
 
 def make_knee_anticipation(spec: Spec[KneeOrthosis], adaptive: bool = False) -> KneeAnticipation:

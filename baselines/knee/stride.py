@@ -44,16 +44,32 @@ class NominalStride:
     @cached_property
     def samples(self) -> Array:
         """Tension [N] and angle [rad], shape (2, n_points), evenly over the stride."""
+        return self._planned[:2]
+
+    @cached_property
+    def loads(self) -> Array:
+        """Load on the leg [1], shape (n_points,), evenly over the stride."""
+        return self._planned[2]
+
+    @cached_property
+    def stance(self) -> Rows:
+        """Stance of the shoe's sensor, shape (n_points,), evenly over the stride."""
+        return self._planned[3] > 0.0
+
+    @cached_property
+    def _planned(self) -> Array:
+        """Tension [N], angle [rad], load [1] and stance, shape (4, n_points)."""
         plant, points = self.plant, math.ceil(self.length)
         leg, shoe = plant.leg, plant.shoe
         phases = np.arange(points) / points
         found, table = gait_curves(plant.activity, phases), plant.gait_table()
         angle = plant.lever.mount_angle + found["knee"]
         quick = NATURAL_STRIDE / plant.stride.time
-        torque, stance = np.zeros(points), np.zeros(points, bool)
+        torque, load, stance = np.zeros(points), np.zeros(points), np.zeros(points, bool)
         for i, phase in enumerate(phases):
             loaded = vertical_load(table, phase, quick)
-            force = leg.body_mass * GRAVITY * max(0.0, loaded)
+            load[i] = max(0.0, loaded)
+            force = leg.body_mass * GRAVITY * load[i]
             cop = centre_of_pressure(
                 found["cop"][i], found["ground_x"][i], loaded, quick, leg.aim_height, shoe.heel,
                 shoe.tip,
@@ -63,7 +79,8 @@ class NominalStride:
             torque[i] = RATIO * estimated_torque(force, cop, math.sin(lean), leg.shank)
             stance[i] = heel_load(force, cop, shoe.heel, shoe.tip) > shoe.threshold
         torque = np.where(stance, filtered(np.tile(torque, 2))[points:], 0.0)
-        return np.stack([np.maximum(plant.lever.tension(torque, angle), 0.0), angle])
+        tension = np.maximum(plant.lever.tension(torque, angle), 0.0)
+        return np.stack([tension, angle, load, stance])
 
     def phase(self, seen: Array, ahead: NDArray[np.int64], sought: Rows, before: Array) -> Array:
         """Return the point of the stride at present, shape (n_env,).
@@ -87,9 +104,19 @@ class NominalStride:
 
     def read(self, points: NDArray[np.generic]) -> Array:
         """Return tension [N] and angle [rad] at the nearest points of the stride, (2, ...)."""
+        return self.samples[:, self._near(points)]
+
+    def load(self, points: NDArray[np.generic]) -> Array:
+        """Return the load on the leg [1] at the nearest points of the stride."""
+        return self.loads[self._near(points)]
+
+    def in_stance(self, points: NDArray[np.generic]) -> Rows:
+        """Return whether the nearest points of the stride are in stance."""
+        return self.stance[self._near(points)]
+
+    def _near(self, points: NDArray[np.generic]) -> NDArray[np.int64]:
         count = self.samples.shape[1]
-        near = np.floor(points * (count / self.length) + 0.5).astype(np.int64)
-        return self.samples[:, near % count]
+        return np.floor(points * (count / self.length) + 0.5).astype(np.int64) % count
 
 
 @entry

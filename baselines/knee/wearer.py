@@ -82,12 +82,35 @@ class WearerModel:
         found = np.empty((*torque.shape, 2))
         begin, given = np.ascontiguousarray(start), np.ascontiguousarray(torque)
         step = self.plant.control_period / SUBSTEPS
-        push_rows(begin, given, np.ascontiguousarray(load), self._hold, step, found)
+        deviate_rows(begin, given, np.ascontiguousarray(load), self._hold, step, found)
         return np.concatenate([begin[:, None], found], axis=1)
+
+    def response(self, load: Array, scale: Array, ends: Array, delay: Array) -> Array:
+        """Return the deviation [rad] at nodes for unit torques at nodes [rad/(N m)].
+
+        Its shape is (n_env, n_nodes, n_nodes), the deviations first. The torque is linear between
+        the nodes.
+
+        Parameters
+        ----------
+        load : ndarray, shape (n_env, n)
+            Load on the leg [1] in each control period.
+        scale : ndarray, shape (n_env, n + 1)
+            Deviation over the nominal one [1] at the ends of control periods.
+        ends : ndarray, shape (n_env, n_nodes)
+            Times of the nodes [control periods], at most ``n``.
+        delay : ndarray, shape (n_env,)
+            Time [control periods] before which a torque at the first node does not act.
+        """
+        found = np.zeros((*ends.shape, ends.shape[1]))
+        step = self.plant.control_period / SUBSTEPS
+        loads, scales = np.ascontiguousarray(load), np.ascontiguousarray(scale)
+        respond_rows(loads, scales, ends, delay, self._hold, step, found)
+        return found
 
 
 @entry
-def push_rows(
+def deviate_rows(
     start: Array, torque: Array, load: Array, hold: Array, step: float, found: Array
 ) -> None:
     """Write deviations and their rates at the ends of control periods."""
@@ -101,3 +124,42 @@ def push_rows(
                 rate = (rate + step * push) / (1.0 + step * damping * hold[4])
                 off = off + step * rate
             found[i, k, 0], found[i, k, 1] = off, rate
+
+
+@entry
+def respond_rows(
+    load: Array, scale: Array, ends: Array, delay: Array, hold: Array, step: float, found: Array
+) -> None:
+    """Write the deviation [rad] at each node for a unit torque at each node, (n_env, k, j).
+
+    The torque is linear between nodes; that of the first node begins when a setpoint takes effect.
+    """
+    nodes, last = ends.shape[1], load.shape[1]
+    for i in range(len(load)):
+        for j in range(nodes):
+            off, rate, k = 0.0, 0.0, 0
+            for m in range(last):
+                time = m + 0.5
+                torque = 0.0
+                if time >= delay[i]:
+                    if time <= ends[i, j]:
+                        if j == 0:
+                            torque = 1.0
+                        elif time > ends[i, j - 1]:
+                            torque = (time - ends[i, j - 1]) / (ends[i, j] - ends[i, j - 1])
+                    elif j == nodes - 1:
+                        torque = 1.0
+                    elif time < ends[i, j + 1]:
+                        torque = (ends[i, j + 1] - time) / (ends[i, j + 1] - ends[i, j])
+                before = off * scale[i, m]
+                stiffness = hold[0] + hold[2] * load[i, m]
+                damping = hold[1] + hold[3] * load[i, m]
+                for _ in range(SUBSTEPS):
+                    push = (-torque - stiffness * off) * hold[4]
+                    rate = (rate + step * push) / (1.0 + step * damping * hold[4])
+                    off = off + step * rate
+                after = off * scale[i, m + 1]
+                while k < nodes and ends[i, k] <= m + 1:
+                    part = ends[i, k] - m
+                    found[i, k, j] = before + part * (after - before)
+                    k += 1

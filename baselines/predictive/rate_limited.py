@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pam_envs.arrays import Array
-from pam_envs.kernels.build import entry
+from pam_envs.kernels.build import entry, kernel
 
 
 def best_path(start: ArrayLike, path: ArrayLike, weight: ArrayLike, reach: ArrayLike) -> Array:
@@ -48,38 +48,44 @@ def best_path(start: ArrayLike, path: ArrayLike, weight: ArrayLike, reach: Array
 
 @entry
 def descend(start: Any, path: Any, weight: Any, reach: Any, made: Any, work: Any) -> None:
-    """Write the best path of every row; ``work`` holds knots, slopes at them, and roots."""
+    """Write the best path of every row; ``work`` is that of :func:`descend_row`."""
+    for i in range(len(start)):
+        descend_row(start[i], path[i], weight[i], reach[i], made[i], work)
+
+
+@kernel
+def descend_row(start: float, path: Any, weight: Any, reach: Any, made: Any, work: Any) -> None:
+    """Write the best path of a row; ``work`` holds knots, slopes at them, and roots."""
     knots, slopes, roots = work[0], work[1], work[2]
     nodes = len(roots) // 2 - 1
-    for i in range(len(start)):
-        low, high, wide = path[i][0], path[i][0], 1.0
-        for k in range(nodes):
-            wide += reach[i][k]
-            low, high = min(low, path[i][k]), max(high, path[i][k])
-        knots[0], knots[1] = low - wide, high + wide
-        slopes[0], slopes[1] = 0.0, 0.0
-        count = 2
-        for back in range(nodes):
-            k = nodes - 1 - back
-            for j in range(count):
-                slopes[j] += weight[i][k] * (knots[j] - path[i][k])
-            right = 1
-            while right < count - 1 and slopes[right] < 0.0:
-                right += 1
-            rise = slopes[right] - slopes[right - 1]
-            share = -slopes[right - 1] / rise if rise > 0.0 else 0.5
-            share = max(0.0, min(1.0, share))
-            root = knots[right - 1] + share * (knots[right] - knots[right - 1])
-            roots[k] = root
-            for j in range(count - right):  # from the right end, to make place for two knots
-                m = count - 1 - j
-                knots[m + 2], slopes[m + 2] = knots[m] + reach[i][k], slopes[m]
-            for j in range(right):
-                knots[j] -= reach[i][k]
-            knots[right], slopes[right] = root - reach[i][k], 0.0
-            knots[right + 1], slopes[right + 1] = root + reach[i][k], 0.0
-            count += 2
-        now = start[i]
-        for k in range(nodes):
-            now = max(now - reach[i][k], min(now + reach[i][k], roots[k]))
-            made[i][k] = now
+    low, high, wide = path[0], path[0], 1.0
+    for k in range(nodes):
+        wide += reach[k]
+        low, high = min(low, path[k]), max(high, path[k])
+    knots[0], knots[1] = low - wide, high + wide
+    slopes[0], slopes[1] = 0.0, 0.0
+    count = 2
+    for back in range(nodes):
+        k = nodes - 1 - back
+        for j in range(count):
+            slopes[j] += weight[k] * (knots[j] - path[k])
+        right = 1
+        while right < count - 1 and slopes[right] < 0.0:
+            right += 1
+        rise = slopes[right] - slopes[right - 1]
+        share = -slopes[right - 1] / rise if rise > 0.0 else 0.5
+        share = max(0.0, min(1.0, share))
+        root = knots[right - 1] + share * (knots[right] - knots[right - 1])
+        roots[k] = root
+        for j in range(count - right):  # from the right end, to make place for two knots
+            m = count - 1 - j
+            knots[m + 2], slopes[m + 2] = knots[m] + reach[k], slopes[m]
+        for j in range(right):
+            knots[j] -= reach[k]
+        knots[right], slopes[right] = root - reach[k], 0.0
+        knots[right + 1], slopes[right + 1] = root + reach[k], 0.0
+        count += 2
+    now = start
+    for k in range(nodes):
+        now = max(now - reach[k], min(now + reach[k], roots[k]))
+        made[k] = now
