@@ -7,14 +7,15 @@ The inverse of yeh2010 is static, and switches between swing and stance when the
 sensed. The regulator then needs dead time, lag and, for the fall of the tension after heel contact,
 0.3 s at its rate limit. Here the nominal pressure is that at which a setpoint takes effect, one
 dead time ahead. From there on, the path of the pressure is the best one within the rate limit
-(:mod:`baselines.predictive.rate_limited`), with a small weight in swing, where the tension is not
-tracked. Heel contact and toe-off are those of the plan, shifted by the wearer's phase
+(:mod:`baselines.predictive.rate_limited`; in a gait :mod:`baselines.knee.pushed_path`), with a
+small weight in swing, where the tension is not tracked. Heel contact and toe-off are those of the plan, shifted by the wearer's phase
 (:mod:`baselines.knee.plan`): the switch is anticipated and not sensed.
 
 A planned sample is in stance where it differs from the tension of zero torque at the planned angle.
 In swing both are equal but for a constant offset, which is observed there.
 
-The torque of a gait's plan is that of the wearer but for a difference, which is sensed and fades.
+The torque of a gait's plan is that of the wearer but for a difference, which is sensed, goes on at
+its present rate for a while, and fades.
 The tension that gives it depends on the angle, which is the plan's, moved by the deviation of the
 wearer's knee under the assistance (:mod:`baselines.knee.wearer`) and by a filtered difference.
 
@@ -70,6 +71,8 @@ USUAL_STRETCH = 0.05
 """Stretch [m] whose errors of the tension have the weight 1."""
 KEPT = 300.0
 """Time constant [periods] for which the torque keeps its distance from the plan."""
+LASTING = 6.0
+"""Time constant [periods] for which that distance keeps its rate."""
 FILTERED = 0.5
 """Share of a difference of the angle that is attributed to the path in a period."""
 YIELDING = np.array([0.001, 0.03])
@@ -125,7 +128,8 @@ class AnticipationState(NamedTuple):
     (n_env, 2, 2), in swing and in stance, are the sums of squares of the deviation, and of its
     product with the sensed one [rad2]. ``torque``, shape (n_env, n_nodes), are the torques of the
     brace [N m] that were planned in the last period, and ``place``, shape (n_env,), is the present
-    in the nominal stride [control periods].
+    in the nominal stride [control periods]. ``before``, shape (n_env, 2), are the torque reference
+    [N m] of the last period and whether it was in stance [0 or 1].
     """
 
     bank: BankState
@@ -137,6 +141,7 @@ class AnticipationState(NamedTuple):
     yielding: Array
     torque: Array
     place: Array
+    before: Array
 
 
 @dataclass(frozen=True)
@@ -186,6 +191,7 @@ class KneeAnticipation(RowController):
             np.tile(YIELDING[:, None], (len(view.set_point), 1, 2)),
             np.zeros((len(view.set_point), len(ENDS))),
             np.zeros(len(view.set_point)),
+            np.zeros((len(view.set_point), 2)),
         )
 
     def respond(self, observation: ArrayLike, state: AnticipationState) -> Prediction:
@@ -221,13 +227,19 @@ class KneeAnticipation(RowController):
             best, off = pushed_path(start, path, weight, reach, push, response)
             reached, angle = stiffness + (best - path) / slope, angle + _near(off)
             most = self.observer.nominal.full_pressure / self.observer.nominal.per_stiffness
-            now = now._replace(torque=self._torque(np.clip(reached, 0.0, most), angle))
+            torque = self._torque(np.clip(reached, 0.0, most), angle)
+            now = now._replace(torque=torque, before=self._before(view, observation))
         else:
             best = best_path(start, path, weight, reach)
         command = arrival.set_point(best[:, 0], self.bank.period)
         command = np.minimum(np.maximum(command, signal.low), signal.high)
         after = now._replace(bank=self.bank.advance(now.bank, command))
         return encode_action(signal, command, observation), after
+
+    def _before(self, view: KneeView, observation: ArrayLike) -> Array:
+        """Return what the next period needs of this one: torque reference [N m], and stance."""
+        assert self.torque is not None
+        return np.stack([self.torque.rows(observation)[0], view.stance], axis=1)
 
     def _torque(self, stiffness: Array, angle: Array) -> Array:
         """Return the torques [N m] of a muscle of stiffnesses [N/m] at angles [rad]."""
@@ -409,21 +421,36 @@ class KneeAnticipation(RowController):
             reference = self._brace_stiffness(now, ends, samples[:, 0])
             return Demand(np.ones_like(known), reference, np.zeros_like(ends), weight)
         lever, place = nominal.plant.lever, (now.place + plan.shift)[:, None]
-        here, _ = self.phase.read(plan, np.zeros((len(ends), 1)))
         stance = self._wholly_in_stance(plan, ends, now)
-        together = view.stance & self._in_stance(here[:, 0], here[:, 1], now)[:, 0]
-        sensed = self.torque.rows(observation)[0]
-        excess = np.where(together, sensed - lever.torque(here[:, 0, 0], here[:, 1, 0]), 0.0)
         soon = self._wholly_in_stance(plan, ends + EARLY, now) & ~stance
         samples = np.where(soon[:, None], self._ahead(now, ends + EARLY)[0], samples)
         torque = lever.torque(samples[:, 0], samples[:, 1])
-        torque = torque + excess[:, None] * np.exp(-ends / KEPT)
+        torque = torque + self._excess_ahead(view, observation, now, ends)
         slack = (nominal.free_tension(samples[:, 1]) <= SMALLEST) & (samples[:, 0] <= SMALLEST)
         stance = stance | soon | (slack & self.stride.in_stance(place + ends))
         correction = np.zeros_like(ends)
         if more is not None:
             correction = more(self.phase.present(plan)[:, None] + ends)
         return Demand(stance, torque, correction, weight)
+
+    def _excess_ahead(
+        self, view: KneeView, observation: ArrayLike, now: AnticipationState, ends: Array
+    ) -> Array:
+        """Return the distances [N m] of the torque from the plan at the nodes.
+
+        They go on at the present rate for a while: the reference is low-passed.
+        """
+        assert self.torque is not None
+        lever, sensed = self.observer.nominal.plant.lever, self.torque.rows(observation)[0]
+        planned, _ = self.phase.read(now.plan, np.tile([-1.0, 0.0], (len(ends), 1)))
+        loaded = self._in_stance(planned[:, 0], planned[:, 1], now)
+        torque = lever.torque(planned[:, 0], planned[:, 1])
+        together = view.stance & loaded[:, 1]
+        excess = np.where(together, sensed - torque[:, 1], 0.0)
+        both = together & loaded[:, 0] & (now.before[:, 1] > 0.0)
+        rate = np.where(both, excess - (now.before[:, 0] - torque[:, 0]), 0.0)
+        gone = LASTING * -np.expm1(-ends / LASTING)
+        return np.asarray(excess[:, None] * np.exp(-ends / KEPT) + rate[:, None] * gone)
 
     def _stiffness(self, demand: Demand, angle: Array) -> Array:
         """Return the demanded stiffnesses [N/m] at angles [rad] of the nodes."""
@@ -538,7 +565,7 @@ ANTICIPATION = partial(
     Entry,
     knowledge="nominal model",
     preview=True,
-    citation="yeh2010; bertsekas2017; thrun2005",
+    citation="yeh2010; bertsekas2017; thrun2005; beck2009",
     envs=KNEE,
     plants=(KneeOrthosis,),
 )

@@ -105,8 +105,8 @@ def times_text(all_rows: Sequence[Row]) -> str:
         "# Computation time per step",
         "",
         "Time of one call of `predict` for one observation, Python included, as stated by the",
-        "author of the row, not verified. Median and 99th percentile of the first 100 actions",
-        "in two episodes, each as the median over the scenarios. Machines and their load differ.",
+        "author of the row, not verified. Median and 99th percentile of the first 50 actions",
+        "in an episode of each scenario. Machines and their load differ.",
         "",
     ]
     columns: Cells = {

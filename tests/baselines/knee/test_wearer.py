@@ -81,6 +81,32 @@ def test_brace_is_carried_along_a_path():
     assert torque == pytest.approx(plant.lever.damping * rate + plant.lever.inertia * 3.0)
 
 
+def test_response_is_the_derivative_of_the_course():
+    leg, draws = WearerModel(KneeOrthosis.on_leg()), np.random.default_rng(1)
+    delay = np.array([4.5, 6.0])
+    ends = delay[:, None] + np.cumsum([1, 1, 1, 2, 2, 4, 4])
+    count = int(np.ceil(ends.max())) + 1
+    load, scale = draws.uniform(0.0, 1.0, (2, count)), draws.uniform(0.5, 2.0, (2, count + 1))
+    torque, halves = draws.normal(0.0, 2.0, ends.shape), np.arange(count) + 0.5
+    given = np.stack([np.interp(halves, ends[i], torque[i]) for i in range(2)])
+    given = np.where(halves < delay[:, None], 0.0, given)
+    course = leg.along(np.zeros((2, 2)), given, load)[..., 0] * scale
+    times = np.arange(count + 1)
+    off = [np.interp(ends[i], times, course[i]) for i in range(2)]
+    made = leg.response(load, scale, ends, delay)
+    np.testing.assert_allclose((made @ torque[..., None])[..., 0], off, rtol=1e-9, atol=1e-12)
+
+
+def test_load_and_stance_are_those_of_the_leg():
+    stride = NominalStride(KneeOrthosis.on_leg())
+    assert stride.loads.min() >= 0.0
+    assert 0.9 < stride.loads.max() < 1.3
+    assert not stride.stance[stride.loads == 0.0].any()
+    points = np.array([0.0, 17.0, 17.4])
+    np.testing.assert_array_equal(stride.load(points), stride.loads[[0, 17, 17]])
+    np.testing.assert_array_equal(stride.in_stance(points), stride.stance[[0, 17, 17]])
+
+
 @pytest.mark.parametrize("name", GAITS)
 def test_nominal_stride_is_the_planned_one(name):
     env = make_env(f"PAM/{name}-v0", episode_seconds=8.0)
