@@ -216,7 +216,7 @@ ENTRIES = {
         "knee_anticipating_adaptive, gain and loop width by least squares, disturbance observer",
         make=make_knee_adaptive_inverse,
         feedback=True,
-        citation="yeh2010; bertsekas2017; thrun2005; magill1965; ohnishi1996",
+        citation="yeh2010; bertsekas2017; thrun2005; beck2009; magill1965; ohnishi1996",
         knobs=KNOBS,
     ),
 }

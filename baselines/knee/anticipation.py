@@ -578,6 +578,6 @@ ENTRIES = {
         "knee_anticipating, its regulator and gain estimated from sensed pressure and tension",
         make=partial(make_knee_anticipation, adaptive=True),
         feedback=True,
-        citation="yeh2010; bertsekas2017; thrun2005; magill1965",
+        citation="yeh2010; bertsekas2017; thrun2005; beck2009; magill1965",
     ),
 }
