@@ -8,16 +8,17 @@ sensed. The regulator then needs dead time, lag and, for the fall of the tension
 0.3 s at its rate limit. Here the nominal pressure is that at which a setpoint takes effect, one
 dead time ahead. From there on, the path of the pressure is the best one within the rate limit
 (:mod:`baselines.predictive.rate_limited`; in a gait :mod:`baselines.knee.pushed_path`), with a
-small weight in swing, where the tension is not tracked. Heel contact and toe-off are those of the plan, shifted by the wearer's phase
-(:mod:`baselines.knee.plan`): the switch is anticipated and not sensed.
+small weight in swing, where the tension is not tracked. Heel contact and toe-off are those of the
+plan, shifted by the wearer's phase (:mod:`baselines.knee.plan`): the switch is anticipated and not
+sensed.
 
 A planned sample is in stance where it differs from the tension of zero torque at the planned angle.
 In swing both are equal but for a constant offset, which is observed there.
 
 The torque of a gait's plan is that of the wearer but for a difference, which is sensed, goes on at
-its present rate for a while, and fades.
-The tension that gives it depends on the angle, which is the plan's, moved by the deviation of the
-wearer's knee under the assistance (:mod:`baselines.knee.wearer`) and by a filtered difference.
+its present rate for a while, and fades. The tension that gives it depends on the angle, which is
+the plan's, moved by the deviation of the wearer's knee under the assistance
+(:mod:`baselines.knee.wearer`) and by a filtered difference.
 
 The adaptive form also estimates the regulator, as the best of a bank of models, and the gain of the
 muscle, as the ratio of the mean products of sensed and nominal tension over a fading memory. With

@@ -75,7 +75,8 @@ ENTRIES = {
         "knee_anticipating_adaptive, and learning of the error from stride to stride",
         make=make_knee_repetitive,
         feedback=True,
-        citation="yeh2010; bertsekas2017; thrun2005; beck2009; magill1965; bristow2006; longman2000",
+        citation="yeh2010; bertsekas2017; thrun2005; beck2009; magill1965; bristow2006; "
+        "longman2000",
         envs=GAIT,
         knobs=KNOBS,
     ),
