@@ -33,6 +33,7 @@ SCHEMA = 3
 PUBLIC, AUDIT = "public", "audit"
 INFORMED_SEEDS = {PUBLIC: 1, AUDIT: 3}
 """Seeds a scenario of a controller that is designed from the plant of each episode."""
+DIGITS = 9  # significant digits of a stored score; the trajectory's digest has all bits
 PROBED_STEPS = 250  # number of steps of the episode that measures the use of the preview
 
 
@@ -262,6 +263,7 @@ def informed_episodes(scene: Scene) -> list[Episode]:
 def episode_record(cell: Cell, seed: int, episode: Episode) -> dict[str, Any]:
     """Return the scores of an episode; one that did not reach its end gets the worst case."""
     saturated = episode.signals.get("saturated", np.zeros(0))
+    scores = scores_of(episode, cell.track.content, cell.scenario.rests)
     return {
         "scenario": cell.scenario.name,
         "seed": seed,
@@ -271,6 +273,6 @@ def episode_record(cell: Cell, seed: int, episode: Episode) -> dict[str, Any]:
         "failed": episode.failed,
         "failure": episode.failure,
         "saturated": float(np.mean(saturated)) if len(saturated) else 0.0,
-        "scores": scores_of(episode, cell.track.content, cell.scenario.rests),
+        "scores": {name: float(f"{value:.{DIGITS}g}") for name, value in scores.items()},
         "trajectory": arrays_digest([episode.actions, *episode.signals.values()]),
     }
