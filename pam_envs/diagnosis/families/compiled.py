@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,14 +22,16 @@ from pam_envs.diagnosis.fit.least_squares import (
     Free,
     Problem,
     column_of,
+    no_violations,
 )
-from pam_envs.diagnosis.fit.single_muscle import PILOT, SETTINGS, identified
+from pam_envs.diagnosis.fit.single_muscle import CLOCK, PILOT, SETTINGS, clock_free, identified
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.parameters import Declaration
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.core.rollout import BEGIN, run
 from pam_envs.pneumatics.flow import SWITCH
 
+OFFSET = Declaration("s", -1.0, 1.0, "assumed", "offset of the readings' clock", 0.0)
 WEIGHT = "hysteresis.weight["
 WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
 ROUNDS, VALVE_ROUNDS = 25, 12
@@ -57,6 +60,10 @@ class CompiledFamily:
     regulator : object or None
         The regulator of the given plant where, for lack of commands, the measured pressures are
         the inputs, and follow at once.
+    commands : tuple of int
+        Channels of the drives that are setpoints.
+    clock : float
+        Largest offset of the readings' clock [s].
     """
 
     plant: Any
@@ -64,6 +71,8 @@ class CompiledFamily:
     drives: Array
     fresh: NDArray[np.bool_]
     regulator: Any = None
+    commands: tuple[int, ...] = ()
+    clock: float = 0.0
 
     channels: ClassVar[tuple[str, ...]]
     settings: ClassVar[Mapping[str, Mapping[str, Any]]]
@@ -76,8 +85,29 @@ class CompiledFamily:
 
     @property
     def column(self) -> Array:
-        """Parameters of the plant, shape (p,)."""
-        return np.asarray(self.plant.parameter_rows())
+        """Parameters of the plant and the offset of the clock, shape (p + 1,)."""
+        return np.append(self.plant.parameter_rows(), 0.0)
+
+    @property
+    def lead(self) -> int:
+        """Number of samples by which the replay advances the setpoints."""
+        return int(np.ceil(self.clock / self.period - 1e-9))
+
+    @cached_property
+    def _advanced(self) -> Array:
+        """Drives with the setpoints advanced within each run, but for its first sample."""
+        if self.lead == 0:
+            return self.drives
+        n = self.drives.shape[1]
+        starts = np.flatnonzero(self.fresh)
+        ends = np.append(starts[1:], n)
+        last = np.repeat(ends, np.diff(ends, prepend=0)) - 1
+        ahead = np.minimum(np.arange(n) + self.lead, last)
+        ahead[starts] = starts
+        made = self.drives.copy()
+        for k in self.commands:
+            made[k] = self.drives[k][ahead]
+        return made
 
     @property
     def loop(self) -> Any:
@@ -85,11 +115,17 @@ class CompiledFamily:
         return self.plant.module("rollout").loop_of(self.plant, True, readings=True)
 
     def simulate(self, columns: Array) -> Array:
-        """Return sensor readings for parameter columns (n, p), shape (channels, T, n)."""
+        """Return sensor readings for parameter columns (n, p + 1), shape (channels, T, n)."""
+        given = columns[:, :-1]
+        if self.lead:
+            given = given.copy()
+            ahead = self.lead * self.period
+            late = self.plant.names.index("regulator.dead_time")
+            given[:, late] += np.maximum(ahead + columns[:, -1], 0.0)
         substeps = max(1, int(np.ceil(self.period / self.longest_step)))
         flags = np.where(self.fresh, BEGIN, 0).astype(np.int64)
         made = run(
-            self.loop, self.plant, columns, self.drives, flags=flags, substeps=substeps,
+            self.loop, self.plant, given, self._advanced, flags=flags, substeps=substeps,
             period=self.period, before=True, lanes=LANES, parallel=True,
         )  # fmt: skip
         outputs = np.ascontiguousarray(made[: len(self.channels)].transpose(2, 0, 1))
@@ -98,11 +134,29 @@ class CompiledFamily:
     def tie(self, columns: Array) -> None:
         """Complete columns: none needs it."""
 
-    checks: ClassVar[int] = 0
+    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
+        """Return starting values of the base.
+
+        From readings (channels, T) with a noise (channels,), and a column with their regulator.
+        """
+        return {}
+
+    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
+        """Return starting values of the flexible base from the fitted values of the base."""
+        return dict(found)
+
+    def spanning(self, measured: Array) -> "CompiledFamily":
+        """Return the family for readings (channels, T), NaN where there is none."""
+        return self
+
+    @property
+    def checks(self) -> int:
+        """Number of checks of :meth:`violations`."""
+        return 0
 
     def violations(self, columns: Array) -> Array:
         """Return by how much columns are not physical: bounds suffice."""
-        return np.zeros((len(columns), 0))
+        return no_violations(columns)
 
     @property
     def _weights(self) -> int:
@@ -119,6 +173,8 @@ class CompiledFamily:
         """Return the declaration of a free parameter."""
         if name.startswith(WEIGHT):
             return WEIGHTS
+        if name == CLOCK:
+            return OFFSET
         found: Declaration = self.plant.declaration(name)
         return found
 
@@ -128,6 +184,8 @@ class CompiledFamily:
             place = self._weights + int(name.removeprefix(WEIGHT)[:-1])
             usual = {"low": 0.0, "high": 1.0, "scale": 0.02, "prior": 25.0}
             return Free(name, place, **{**usual, "start": float(self.column[place]), **changes})
+        if name == CLOCK:
+            return clock_free(self.clock, len(self.column) - 1, changes)
         d, value = self.declared(name), self.plant.value(name)
         made: dict[str, Any] = {"low": d.low, "high": d.high, "start": value}
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
@@ -140,6 +198,7 @@ class CompiledFamily:
         names = [n for n in self.settings if not (self.measured_drive and in_valve(n))]
         if not self.measured_drive and self.plant.value(PILOT_LAG) != 0.0:
             names += list(PILOT)
+        names += [CLOCK] if self.lead else []
         names += [f"{WEIGHT}{k}]" for k in range(self.elements)]
         present = [
             name
@@ -199,7 +258,7 @@ class CompiledFamily:
 
 def in_valve(name: str) -> bool:
     """Return whether a parameter acts upstream of the pressure."""
-    return name.startswith(("regulator.", "valve."))
+    return name.startswith(("regulator.", "valve.", "clock."))
 
 
 def shut_off(values: Array, recording: Recording) -> Array:
@@ -238,7 +297,7 @@ def regulator_of(
     alone = np.where(pressures[:, None], problem.measured, np.nan)
     if not valve or not np.isfinite(alone).any():
         return family, {}, family.column
-    only = dataclasses.replace(problem, measured=alone)
+    only = dataclasses.replace(problem, measured=alone, violations=no_violations, checks=0)
     orders = [valve]
     if not {f.name for f in valve} & set(PILOT) and family.plant.air == "regulator":
         orders.append((*valve, *(family.free(name, start=start) for name, start in PILOT.items())))
@@ -254,9 +313,20 @@ def calibrate_compiled(
     family: Any, measured: Array, noise: Array, blocks: Blocks, time: Array, shapes: Array
 ) -> Calibration:
     """Fit the base of a plant: the regulator to the pressures alone, then all parameters."""
-    problem = Problem(family.simulate, measured, noise, blocks.train, time, family.tie, shapes)
+    family = family.spanning(measured)
+    problem = Problem(
+        *(family.simulate, measured, noise, blocks.train, time, family.tie, shapes),
+        violations=family.violations,
+        checks=family.checks,
+    )
     family, found, column = regulator_of(problem, family, blocks)
-    problem = dataclasses.replace(problem, simulate=family.simulate, tie=family.tie)
-    start = start_at_guess(family.base(), dict(found))
-    base = fit_base(problem, blocks, column, [start], ROUNDS)
-    return Calibration(family, problem, base, dict(found), None)
+    problem = dataclasses.replace(
+        problem, simulate=family.simulate, tie=family.tie, violations=family.violations
+    )
+    law = family.guess(measured, noise, column)
+    starts = [start_at_guess(family.base(), dict(found))]
+    if law:
+        starts.append(start_at_guess(family.base(), {**found, **law}))
+    base = fit_base(problem, blocks, column, starts, ROUNDS)
+    guess = family.flexible_guess(base.fit.values())
+    return Calibration(family, problem, base, guess, None, linear=False)

@@ -14,13 +14,15 @@ from pam_envs.arrays import Array
 from pam_envs.data.recording.channels import arm_channels
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.causes import catalogue
+from pam_envs.diagnosis.families.adapted import with_correction, with_yielding
 from pam_envs.diagnosis.families.antagonistic_joint import (
+    CORRECTED,
     MUSCLES,
     UNEQUAL,
     JointKind,
+    PairFamily,
     difference_of,
 )
-from pam_envs.diagnosis.families.regulated import RegulatedFamily
 from pam_envs.diagnosis.plant_protocol import Signals
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import JOINT_OUTPUTS, MUSCLE_OUTPUTS
@@ -32,7 +34,7 @@ SETTINGS: dict[str, dict[str, Any]] = MUSCLES | {
 """Base parameters with the settings of their fits."""
 
 
-class BoundArm(RegulatedFamily):
+class BoundArm(PairFamily):
     """Arm with the inputs of a recording."""
 
     settings: ClassVar[Mapping[str, Mapping[str, Any]]] = SETTINGS
@@ -46,6 +48,20 @@ class BoundArm(RegulatedFamily):
     def pairs(self) -> Mapping[str, str]:  # type: ignore[override]
         """Name of each setpoint to that of its pressure."""
         return arm_channels(self.plant.stages).measured
+
+    def joint_channels(self) -> list[tuple[str, tuple[str, str]]]:
+        """Return the channel of each joint's angle, and those of its pressures."""
+        joints = range(self.plant.stages)
+        return [(f"angle_{k}", (f"pressure_{2 * k}", f"pressure_{2 * k + 1}")) for k in joints]
+
+    def weights_at(self, angles: Array, payload: Array | float) -> Array:
+        """Return the torques of weight and payload [kg] at angles (n, T) [rad], (n, T)."""
+        return np.moveaxis(self.plant.weight_torque(angles.T, payload), -1, 0)
+
+    def named(self, found: dict[str, float]) -> dict[str, float]:
+        """Return a guess whose factor on the own weight is that of the links' masses."""
+        factor = found.pop("weight", 1.0)
+        return {**found, "arm.mass_factor": factor} if found else {}
 
     def signal_rows(self) -> Mapping[str, int]:
         """Return the row of state of each torque and force."""
@@ -68,7 +84,7 @@ class ArmKind(JointKind):
 
     plant = RedundantManipulator
     bound = BoundArm
-    catalogue = (*catalogue(), UNEQUAL)
+    catalogue = (*with_yielding(with_correction(catalogue(), "muscle", CORRECTED)), UNEQUAL)
 
     def pairs_of(self, plant: Any) -> Mapping[str, str]:
         """Return the name of each setpoint and that of its pressure."""
