@@ -98,6 +98,7 @@ class PairFamily(RegulatedFamily):
     """Plant whose joints have pairs of muscles, all alike."""
 
     law: ClassVar[str] = "muscle"
+    last: ClassVar[tuple[str, ...]] = ("muscle.braid_strain",)
 
     def joint_channels(self) -> list[tuple[str, tuple[str, str]]]:
         """Return the channel of each joint's angle, and those of its pressures."""

@@ -32,6 +32,8 @@ from pam_envs.plants.core.rollout import BEGIN, run
 from pam_envs.pneumatics.flow import SWITCH
 
 OFFSET = Declaration("s", -1.0, 1.0, "assumed", "offset of the readings' clock", 0.0)
+CLOCK_PRIOR = 0.3
+"""Prior of that offset, over its scale: a delay is a dead time unless readings are early."""
 WEIGHT = "hysteresis.weight["
 WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
 ROUNDS, VALVE_ROUNDS = 25, 12
@@ -77,6 +79,8 @@ class CompiledFamily:
     channels: ClassVar[tuple[str, ...]]
     settings: ClassVar[Mapping[str, Mapping[str, Any]]]
     longest_step: ClassVar[float] = 0.0051
+    last: ClassVar[tuple[str, ...]] = ()
+    """Base parameters that are fitted after the others, with which a fit hardly converges."""
 
     @property
     def measured_drive(self) -> bool:
@@ -90,7 +94,7 @@ class CompiledFamily:
 
     @property
     def lead(self) -> int:
-        """Number of samples by which the replay advances the setpoints."""
+        """Number of samples by which a replay with early readings advances the setpoints."""
         return int(np.ceil(self.clock / self.period - 1e-9))
 
     @cached_property
@@ -115,17 +119,33 @@ class CompiledFamily:
         return self.plant.module("rollout").loop_of(self.plant, True, readings=True)
 
     def simulate(self, columns: Array) -> Array:
-        """Return sensor readings for parameter columns (n, p + 1), shape (channels, T, n)."""
+        """Return sensor readings for parameter columns (n, p + 1), shape (channels, T, n).
+
+        An offset of the clock adds to the dead time; where their sum is below zero, readings
+        precede the recorded setpoints, and these are advanced.
+        """
         given = columns[:, :-1]
-        if self.lead:
-            given = given.copy()
-            ahead = self.lead * self.period
-            late = self.plant.names.index("regulator.dead_time")
-            given[:, late] += np.maximum(ahead + columns[:, -1], 0.0)
+        if self.lead == 0:
+            return self._run(given, self.drives)
+        given, late = given.copy(), self.plant.names.index("regulator.dead_time")
+        given[:, late] += columns[:, -1]
+        early = given[:, late] < 0.0
+        given[early, late] = np.maximum(given[early, late] + self.lead * self.period, 0.0)
+        if early.all():
+            return self._run(given, self._advanced)
+        if not early.any():
+            return self._run(given, self.drives)
+        made = np.empty((len(columns), len(self.channels), len(self.fresh))).transpose(1, 2, 0)
+        made[:, :, early] = self._run(given[early], self._advanced)
+        made[:, :, ~early] = self._run(given[~early], self.drives)
+        return made
+
+    def _run(self, columns: Array, drives: Array) -> Array:
+        """Return sensor readings with drives for plants' columns (n, p), (channels, T, n)."""
         substeps = max(1, int(np.ceil(self.period / self.longest_step)))
         flags = np.where(self.fresh, BEGIN, 0).astype(np.int64)
         made = run(
-            self.loop, self.plant, given, self._advanced, flags=flags, substeps=substeps,
+            self.loop, self.plant, columns, drives, flags=flags, substeps=substeps,
             period=self.period, before=True, lanes=LANES, parallel=True,
         )  # fmt: skip
         outputs = np.ascontiguousarray(made[: len(self.channels)].transpose(2, 0, 1))
@@ -185,7 +205,7 @@ class CompiledFamily:
             usual = {"low": 0.0, "high": 1.0, "scale": 0.02, "prior": 25.0}
             return Free(name, place, **{**usual, "start": float(self.column[place]), **changes})
         if name == CLOCK:
-            return clock_free(self.clock, len(self.column) - 1, changes)
+            return clock_free(self.clock, len(self.column) - 1, {"prior": CLOCK_PRIOR, **changes})
         d, value = self.declared(name), self.plant.value(name)
         made: dict[str, Any] = {"low": d.low, "high": d.high, "start": value}
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
@@ -324,9 +344,13 @@ def calibrate_compiled(
         problem, simulate=family.simulate, tie=family.tie, violations=family.violations
     )
     law = family.guess(measured, noise, column)
-    starts = [start_at_guess(family.base(), dict(found))]
+    usual = start_at_guess(family.base(), dict(found))
+    starts = [tuple(free for free in usual if free.name not in family.last)]
     if law:
         starts.append(start_at_guess(family.base(), {**found, **law}))
-    base = fit_base(problem, blocks, column, starts, ROUNDS)
+    base = fit_base(problem, blocks, column, starts, ROUNDS, boxed=True)
+    if family.last:
+        whole = start_at_guess(family.base(), base.fit.values())
+        base = fit_base(problem, blocks, column, [whole], ROUNDS, boxed=True)
     guess = family.flexible_guess(base.fit.values())
     return Calibration(family, problem, base, guess, None, linear=False)
