@@ -80,7 +80,7 @@ class CompiledFamily:
     settings: ClassVar[Mapping[str, Mapping[str, Any]]]
     longest_step: ClassVar[float] = 0.0051
     last: ClassVar[tuple[str, ...]] = ()
-    """Base parameters that are fitted after the others, with which a fit hardly converges."""
+    """Base parameters that are fitted after the others, with which a fit converges less often."""
 
     @property
     def measured_drive(self) -> bool:
@@ -348,7 +348,8 @@ def calibrate_compiled(
     starts = [tuple(free for free in usual if free.name not in family.last)]
     if law:
         starts.append(start_at_guess(family.base(), {**found, **law}))
-    base = fit_base(problem, blocks, column, starts, ROUNDS, boxed=True)
+    tried = [fit_base(problem, blocks, column, starts, ROUNDS, boxed) for boxed in (False, True)]
+    base = min(tried, key=lambda found: found.fit.cost)
     if family.last:
         whole = start_at_guess(family.base(), base.fit.values())
         base = fit_base(problem, blocks, column, [whole], ROUNDS, boxed=True)

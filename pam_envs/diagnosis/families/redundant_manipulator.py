@@ -22,6 +22,7 @@ from pam_envs.diagnosis.families.antagonistic_joint import (
     PairFamily,
     difference_of,
 )
+from pam_envs.diagnosis.fit.single_muscle import CLOCK
 from pam_envs.diagnosis.plant_protocol import Signals
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import JOINT_OUTPUTS, MUSCLE_OUTPUTS
@@ -30,6 +31,8 @@ SETTINGS: dict[str, dict[str, Any]] = {
     **{name: values for name, values in MUSCLES.items() if name != "muscle.braid_strain"},
     "arm.mass_factor": {"log": True, "prior": 0.7},
     "arm.damping_factor": {"log": True, "low": 1e-2, "prior": 1.5},
+    "hysteresis.base": {"log": True, "low": 1.0, "prior": 1.5},
+    "hysteresis.rate": {"log": True, "low": 1e-6, "prior": 1.5},
 }
 """Base parameters with the settings of their fits. The law of the muscles keeps its shape: with a
 free one the fits stall, and a corrected law explains the rest."""
@@ -39,6 +42,7 @@ class BoundArm(PairFamily):
     """Arm with the inputs of a recording."""
 
     settings: ClassVar[Mapping[str, Mapping[str, Any]]] = SETTINGS
+    last: ClassVar[tuple[str, ...]] = (CLOCK,)
 
     @cached_property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -54,8 +58,6 @@ class BoundArm(PairFamily):
         """Return the channel of each joint's angle, and those of its pressures."""
         joints = range(self.plant.stages)
         return [(f"angle_{k}", (f"pressure_{2 * k}", f"pressure_{2 * k + 1}")) for k in joints]
-
-    last: ClassVar[tuple[str, ...]] = ()
 
     def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
         """Return no starting values: the arm weighs too little for a balance of torques."""
