@@ -46,8 +46,32 @@ LEAST_LAG = 2e-3
 """Least time constant of a regulator [s]."""
 
 
+class UsualStart:
+    """Defaults of a family whose base is fitted at once, from its usual start."""
+
+    last: ClassVar[tuple[str, ...]] = ()
+    """Base parameters that are fitted after the others, with which a fit converges less often."""
+    linear: ClassVar[bool] = True
+    """Whether a linear model may show that a difference is needed, without a refit."""
+
+    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
+        """Return starting values of the base.
+
+        From readings (channels, T) with a noise (channels,), and a column with their regulator.
+        """
+        return {}
+
+    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
+        """Return starting values of the flexible base from the fitted values of the base."""
+        return dict(found)
+
+    def spanning(self, measured: Array) -> Any:
+        """Return the family for readings (channels, T), NaN where there is none."""
+        return self
+
+
 @dataclass(frozen=True)
-class CompiledFamily:
+class CompiledFamily(UsualStart):
     """Plant with the inputs of a recording, replayed by its compiled loop.
 
     Attributes
@@ -79,8 +103,7 @@ class CompiledFamily:
     channels: ClassVar[tuple[str, ...]]
     settings: ClassVar[Mapping[str, Mapping[str, Any]]]
     longest_step: ClassVar[float] = 0.0051
-    last: ClassVar[tuple[str, ...]] = ()
-    """Base parameters that are fitted after the others, with which a fit converges less often."""
+    linear: ClassVar[bool] = False
 
     @property
     def measured_drive(self) -> bool:
@@ -153,21 +176,6 @@ class CompiledFamily:
 
     def tie(self, columns: Array) -> None:
         """Complete columns: none needs it."""
-
-    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
-        """Return starting values of the base.
-
-        From readings (channels, T) with a noise (channels,), and a column with their regulator.
-        """
-        return {}
-
-    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
-        """Return starting values of the flexible base from the fitted values of the base."""
-        return dict(found)
-
-    def spanning(self, measured: Array) -> "CompiledFamily":
-        """Return the family for readings (channels, T), NaN where there is none."""
-        return self
 
     @property
     def checks(self) -> int:
@@ -354,4 +362,4 @@ def calibrate_compiled(
         whole = start_at_guess(family.base(), base.fit.values())
         base = fit_base(problem, blocks, column, [whole], ROUNDS, boxed=True)
     guess = family.flexible_guess(base.fit.values())
-    return Calibration(family, problem, base, guess, None, linear=False)
+    return Calibration(family, problem, base, guess, None, linear=family.linear)
