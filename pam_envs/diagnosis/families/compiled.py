@@ -51,6 +51,8 @@ class UsualStart:
 
     last: ClassVar[tuple[str, ...]] = ()
     """Base parameters that are fitted after the others, with which a fit converges less often."""
+    limits: ClassVar[tuple[bool, ...]] = (True,)
+    """Whether fits of the base also try steps with a limit for each parameter; the best is kept."""
     linear: ClassVar[bool] = True
     """Whether a linear model may show that a difference is needed, without a refit."""
 
@@ -356,7 +358,7 @@ def calibrate_compiled(
     starts = [tuple(free for free in usual if free.name not in family.last)]
     if law:
         starts.append(start_at_guess(family.base(), {**found, **law}))
-    tried = [fit_base(problem, blocks, column, starts, ROUNDS, boxed) for boxed in (False, True)]
+    tried = [fit_base(problem, blocks, column, starts, ROUNDS, boxed) for boxed in family.limits]
     base = min(tried, key=lambda found: found.fit.cost)
     if family.last:
         whole = start_at_guess(family.base(), base.fit.values())

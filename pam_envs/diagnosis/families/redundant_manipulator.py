@@ -43,6 +43,7 @@ class BoundArm(PairFamily):
 
     settings: ClassVar[Mapping[str, Mapping[str, Any]]] = SETTINGS
     last: ClassVar[tuple[str, ...]] = (CLOCK,)
+    limits: ClassVar[tuple[bool, ...]] = (False, True)
 
     @cached_property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]
