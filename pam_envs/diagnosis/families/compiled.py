@@ -52,7 +52,7 @@ class UsualStart:
     last: ClassVar[tuple[str, ...]] = ()
     """Base parameters that are fitted after the others, with which a fit converges less often."""
     limits: ClassVar[tuple[bool, ...]] = (True,)
-    """Whether fits of the base also try steps with a limit for each parameter; the best is kept."""
+    """Whether steps of a fit of the base are also limited by parameter; the best fit is kept."""
     linear: ClassVar[bool] = True
     """Whether a linear model may show that a difference is needed, without a refit."""
 
