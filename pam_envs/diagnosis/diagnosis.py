@@ -333,7 +333,7 @@ class Study:
     def flexible(self) -> FlexibleBase:
         """Selection of the differences in which rigs commonly depart from the base."""
         data = (self.problem, self.family, self.blocks, self.base, self.rule)
-        return FlexibleBase(*data, self.fitted.guess, self.fitted.rate)
+        return FlexibleBase(*data, self.fitted.guess, self.fitted.rate, self.fitted.linear)
 
     def make_flexible(self, causes: Sequence[Cause]) -> None:
         """Add the common differences that the recording needs to the base."""

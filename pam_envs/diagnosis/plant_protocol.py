@@ -147,6 +147,10 @@ class Fitted(Protocol):
     def rate(self) -> Form | None:
         """Form of the limited rate that the pressure needs."""
 
+    @property
+    def linear(self) -> bool:
+        """Whether a linear model may show that a difference is needed, without a refit."""
+
 
 class Kind(Protocol):
     """A plant that can be diagnosed, before a recording is given."""

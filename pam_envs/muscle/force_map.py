@@ -18,14 +18,16 @@ Actuators 6 (2017) 33: the map.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
-from pam_envs.muscle.effects import TemperatureEffects
-from pam_envs.parameters import assumed, derived, identified, published
+from pam_envs.muscle.effects import LengthYieldEffects, TemperatureEffects
+from pam_envs.muscle.law_correction import FIELDS, LawCorrection
+from pam_envs.parameters import assumed, declarations, derived, identified, published
 
 _FIT = "least squares on the measured map of a DMSP-10-250 (data/dmsp10_force_map.csv)"
 FULL_PRESSURE = 6.5e5
@@ -35,13 +37,19 @@ PAPER_CONTRACTION = 0.25
 
 
 @dataclass(frozen=True)
-class ForceMap(TemperatureEffects):
+class ForceMap(LawCorrection, LengthYieldEffects, TemperatureEffects):
     """Muscle DMSP-10-150N.
 
     ``stretch`` lengthens the axis of contraction. Inverses of the law do not use ``gain`` and
     ``imbalance``, which describe the specimens: muscle A pulls ``gain (1 + imbalance)`` times the
-    law, muscle B ``gain (1 - imbalance)`` times.
+    law, muscle B ``gain (1 - imbalance)`` times. Nor do they use the correction of the law.
     """
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        *TemperatureEffects.effects,
+        tuple(declarations(LengthYieldEffects)),
+        FIELDS,
+    )
 
     area: float = identified(8.9128e-4, "m2", 1e-5, 1e-2, _FIT)
     taper: float = identified(3.0078, "1", 0.0, 10.0, _FIT)
@@ -102,9 +110,14 @@ class ForceMap(TemperatureEffects):
         p = np.asarray(pressure, float)
         return np.asarray(self.area_at(contraction) * p - self.passive(contraction))
 
+    def corrected(self, pressure: ArrayLike, contraction: ArrayLike) -> NDArray[np.float64]:
+        """Return the force [N] of the corrected law, below 0 if slack."""
+        law = self.law(pressure, contraction)
+        return law + self.correction(pressure, contraction) if self.corrects else law
+
     def force(self, pressure: ArrayLike, contraction: ArrayLike) -> NDArray[np.float64]:
         """Return the force [N], 0 where the muscle is slack."""
-        return np.maximum(0.0, self.law(pressure, contraction))
+        return np.maximum(0.0, self.corrected(pressure, contraction))
 
     def pressure(self, force: ArrayLike, contraction: ArrayLike) -> NDArray[np.float64]:
         """Return the pressure [Pa] of a force [N] at a contraction [1]: exact."""

@@ -103,6 +103,8 @@ class FlexibleBase:
     rule: Rule
     guess: Mapping[str, float] = field(default_factory=dict)  # starting values by parameter
     rate: Form | None = None  # form of the limited rate that the pressure needs
+    # whether a linear model may show that a difference is needed, without a refit
+    linear: bool = True
 
     def chosen(self, causes: Sequence[Cause]) -> list[tuple[Cause, Form]]:
         """Return the common differences that the base lacks, each in the form of all its forms.
@@ -171,8 +173,9 @@ class FlexibleBase:
         needed: set[str] = set()  # the fewer others remain, the more they are
         while any(cause.common for cause, _ in model.causes):
             expected = self.expected(model)
-            doubtful = {n for n, gain in expected.items() if gain <= OBVIOUS and n not in needed}
-            smaller = without_each_cause(*data, model, doubtful, CLEAR)
+            limit, clear = (OBVIOUS, CLEAR) if self.linear else (np.inf, np.inf)
+            doubtful = {n for n, gain in expected.items() if gain <= limit and n not in needed}
+            smaller = without_each_cause(*data, model, doubtful, clear)
             losses = {name: self.loss(less, model) for name, less in smaller.items()}
             needed |= {name for name, loss in losses.items() if loss > CLEAR}
             least = min(losses, key=lambda name: losses[name], default="")

@@ -31,6 +31,32 @@ def with_bearing(component: str, breaks: Sequence[float]) -> tuple[Cause, ...]:
     return (*(c for c in catalogue() if c.name != guide.name), bearing)
 
 
+def with_correction(
+    causes: Sequence[Cause], component: str, orders: Sequence[tuple[int, int]]
+) -> tuple[Cause, ...]:
+    """Return causes whose static law is the correction of a component.
+
+    ``orders`` are the orders in pressure and strain of its terms.
+    """
+    law = by_name("static_law")
+    (form,) = law.forms
+    terms = tuple(replace(form.terms[0], name=f"{component}.map_{p}{e}") for p, e in orders)
+    corrected = replace(law, forms=(replace(form, terms=terms),))
+    return tuple(corrected if cause.name == law.name else cause for cause in causes)
+
+
+def with_yielding(causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    """Return causes whose shape of the loops is friction of the length that yields smoothly.
+
+    For plants whose friction is driven by length anyway.
+    """
+    shape, drive = by_name("hysteresis_shape"), by_name("hysteresis_drive")
+    form = next(form for form in drive.forms if form.name == "yielding")
+    made = replace(shape, forms=(form,))
+    kept = (cause for cause in causes if cause.name != drive.name)
+    return tuple(made if cause.name == shape.name else cause for cause in kept)
+
+
 def adapted(
     causes: Sequence[Cause],
     plant: Any,

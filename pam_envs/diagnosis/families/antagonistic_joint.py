@@ -9,9 +9,17 @@ from pam_envs.arrays import Array
 from pam_envs.constants import BAR, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.cause import Cause, Form, Term
-from pam_envs.diagnosis.families.adapted import with_bearing
+from pam_envs.diagnosis.families.adapted import (
+    with_bearing,
+    with_correction,
+    with_yielding,
+)
+from pam_envs.diagnosis.families.compiled import WEIGHT
+from pam_envs.diagnosis.families.pair_balance import PairBalance
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
+from pam_envs.diagnosis.fit.single_muscle import grouped
 from pam_envs.diagnosis.plant_protocol import Signals
+from pam_envs.plants.antagonistic_joint.hysteresis import REFERENCE_PRESSURE
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import FROM_THEM
 
@@ -20,10 +28,11 @@ MUSCLES: dict[str, dict[str, Any]] = REGULATOR | {
     "muscle.taper": {"scale": 0.1, "prior": 60.0},
     "muscle.threshold": {"scale": 5.0, "prior": 60.0},
     "muscle.braid_force": {"scale": 5.0, "prior": 60.0},
+    "muscle.braid_strain": {"log": True, "prior": 1.0},
     "muscle.stiffness": {"scale": 50.0, "prior": 60.0},
     "muscle.viscosity": {"scale": 5e-5, "prior": 60.0},
-    "hysteresis.base": {"log": True, "low": 1.0, "prior": 1.5},
-    "hysteresis.rate": {"log": True, "low": 1e-6, "prior": 1.5},
+    "hysteresis.base": {"log": True, "low": 50.0, "prior": 1.5},
+    "hysteresis.rate": {"log": True, "low": 3e-4, "prior": 1.5},
 }
 """Parameters of regulators and muscles with the settings of their fits that differ from the
 declarations."""
@@ -56,9 +65,17 @@ UNEQUAL = Cause(
     needs=("contraction",),
     sensor="a load cell at either muscle",
     compensable=True,
+    common=True,
 )
 BREAKS = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
 """Breakaway torques [N m] at which the search for a sticking bearing begins."""
+CORRECTED = (
+    *((0, 2), (0, 3), (0, 4), (1, 2), (1, 3)),
+    *((2, 0), (2, 1), (2, 2), (3, 0), (3, 1)),
+)
+"""Orders in pressure and strain of the terms that the law of the muscles lacks, up to order 4."""
+LEAST_BREAK = 2e-3
+"""Least strain over which yielding friction builds up, where a fit starts."""
 PAIRS = {"set_point_a": "pressure_a", "set_point_b": "pressure_b"}
 
 
@@ -77,7 +94,90 @@ def difference_of(
     )
 
 
-class BoundJoint(RegulatedFamily):
+class PairFamily(RegulatedFamily):
+    """Plant whose joints have pairs of muscles, all alike."""
+
+    law: ClassVar[str] = "muscle"
+    last: ClassVar[tuple[str, ...]] = ("muscle.braid_strain",)
+
+    def joint_channels(self) -> list[tuple[str, tuple[str, str]]]:
+        """Return the channel of each joint's angle, and those of its pressures."""
+        return [("angle", ("pressure_a", "pressure_b"))]
+
+    def recorded_states(self, measured: Array) -> Array:
+        """Return groups of pressures [Pa] and strains of all muscles, (2, k)."""
+        plant, place = self.plant, self.channels.index
+        strains, pressures = [], []
+        for angle, pair in self.joint_channels():
+            strain = plant.lever.contraction(measured[place(angle)], plant.muscle.rest_length)
+            strains += list(strain.T)
+            pressures += [measured[place(name)] for name in pair]
+        return grouped(np.concatenate(strains), np.concatenate(pressures), slack=False)
+
+    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
+        """Return starting values of the base from the balance of torques."""
+        joints = self.joint_channels()
+        place = self.channels.index
+        angles = measured[[place(angle) for angle, _ in joints]]
+        if not hasattr(self.plant.hysteresis.operator, "thresholds") or np.any(
+            np.isfinite(angles).sum(axis=1) < len(angles.T) // 2
+        ):
+            return {}
+        gauges = [place(name) for _, pair in joints for name in pair]
+        pressures = np.maximum(0.0, self.simulate(column[None])[gauges, :, 0])
+        known = np.nan_to_num(angles)
+        own, whole = (self.weights_at(known, mass) for mass in (0.0, self.payload()))
+        size = float(noise[place(joints[0][0])])
+        data = (self.plant, REFERENCE_PRESSURE, angles, size, pressures, own, whole - own)
+        return self.named(PairBalance(*data, self.period).solve())
+
+    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
+        """Return starting values at which all friction yields smoothly."""
+        names = [name for name in found if name.startswith(WEIGHT)]
+        thresholds = getattr(self.plant.hysteresis.operator, "thresholds", ())
+        weights = np.array([found[name] for name in names])
+        if not names or weights.sum() <= 0.0:
+            return dict(found)
+        slip = float(weights @ np.array(thresholds))  # [1], over the stiffness of the friction
+        base, rate = found["hysteresis.base"], found["hysteresis.rate"]
+        away = slip / float(weights.sum()) * base / (base + rate * REFERENCE_PRESSURE)
+        return {
+            **found,
+            **dict.fromkeys(names, 0.0),
+            "muscle.yield_force": base * slip,
+            "muscle.yield_per_pressure": rate * slip,
+            "muscle.yield_break": max(away, LEAST_BREAK),
+            "muscle.yield_ratio": 0.5,
+        }
+
+    def payload(self) -> Array:
+        """Return the payload [kg], (T,)."""
+        names = list(self.plant.module("rollout").channels_of(self.plant))
+        return np.asarray(self.drives[names.index("payload"), :, 0])
+
+    def weights_at(self, angles: Array, payload: Array | float) -> Array:
+        """Return the torques of weight and payload [kg] at angles (n, T) [rad], (n, T)."""
+        return np.asarray(self.plant.weight_torque(angles, payload))
+
+    def named(self, found: dict[str, float]) -> dict[str, float]:
+        """Return a guess whose factor on the own weight is that on a parameter."""
+        factor = found.pop("weight", 1.0)
+        return {**found, "link.centre": factor * self.plant.link.centre} if found else {}
+
+    def law_slopes(self, columns: Array, pressure: Array, strain: Array) -> tuple[Array, ...]:
+        """Return slopes of the laws of columns (n, p), without correction, at states (k,)."""
+
+        def value(name: str) -> Array:
+            return columns[:, [self.plant.names.index(f"muscle.{name}")]]
+
+        area, stretch, width = value("area"), value("stretch"), value("braid_strain")
+        e = strain / stretch
+        braid = value("braid_force") / width * np.exp(-e / width)
+        stiff = (area * value("taper") * pressure + braid + value("stiffness")) / stretch
+        return stiff, area * (1.0 - value("taper") * e), area
+
+
+class BoundJoint(PairFamily):
     """Joint with the inputs of a recording."""
 
     channels: ClassVar[tuple[str, ...]] = (
@@ -104,7 +204,10 @@ class JointKind(RegulatedKind):
     renamed = ({"position": "angle", "mass": "link"},)
     factors = FACTORS
     titles = TITLES
-    catalogue = (*with_bearing("link", BREAKS), UNEQUAL)
+    catalogue = (
+        *with_yielding(with_correction(with_bearing("link", BREAKS), "muscle", CORRECTED)),
+        UNEQUAL,
+    )
 
     def drives(
         self, plant: Any, recording: Recording, set_points: Sequence[Array]

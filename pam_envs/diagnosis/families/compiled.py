@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,14 +22,18 @@ from pam_envs.diagnosis.fit.least_squares import (
     Free,
     Problem,
     column_of,
+    no_violations,
 )
-from pam_envs.diagnosis.fit.single_muscle import PILOT, SETTINGS, identified
+from pam_envs.diagnosis.fit.single_muscle import CLOCK, PILOT, SETTINGS, clock_free, identified
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.parameters import Declaration
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.core.rollout import BEGIN, run
 from pam_envs.pneumatics.flow import SWITCH
 
+OFFSET = Declaration("s", -1.0, 1.0, "assumed", "offset of the readings' clock", 0.0)
+CLOCK_PRIOR = 0.3
+"""Prior of that offset, over its scale: a delay is a dead time unless readings are early."""
 WEIGHT = "hysteresis.weight["
 WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hysteresis")
 ROUNDS, VALVE_ROUNDS = 25, 12
@@ -41,8 +46,34 @@ LEAST_LAG = 2e-3
 """Least time constant of a regulator [s]."""
 
 
+class UsualStart:
+    """Defaults of a family whose base is fitted at once, from its usual start."""
+
+    last: ClassVar[tuple[str, ...]] = ()
+    """Base parameters that are fitted after the others, with which a fit converges less often."""
+    limits: ClassVar[tuple[bool, ...]] = (True,)
+    """Whether steps of a fit of the base are also limited by parameter; the best fit is kept."""
+    linear: ClassVar[bool] = True
+    """Whether a linear model may show that a difference is needed, without a refit."""
+
+    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
+        """Return starting values of the base.
+
+        From readings (channels, T) with a noise (channels,), and a column with their regulator.
+        """
+        return {}
+
+    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
+        """Return starting values of the flexible base from the fitted values of the base."""
+        return dict(found)
+
+    def spanning(self, measured: Array) -> Any:
+        """Return the family for readings (channels, T), NaN where there is none."""
+        return self
+
+
 @dataclass(frozen=True)
-class CompiledFamily:
+class CompiledFamily(UsualStart):
     """Plant with the inputs of a recording, replayed by its compiled loop.
 
     Attributes
@@ -57,6 +88,10 @@ class CompiledFamily:
     regulator : object or None
         The regulator of the given plant where, for lack of commands, the measured pressures are
         the inputs, and follow at once.
+    commands : tuple of int
+        Channels of the drives that are setpoints.
+    clock : float
+        Largest offset of the readings' clock [s].
     """
 
     plant: Any
@@ -64,10 +99,13 @@ class CompiledFamily:
     drives: Array
     fresh: NDArray[np.bool_]
     regulator: Any = None
+    commands: tuple[int, ...] = ()
+    clock: float = 0.0
 
     channels: ClassVar[tuple[str, ...]]
     settings: ClassVar[Mapping[str, Mapping[str, Any]]]
     longest_step: ClassVar[float] = 0.0051
+    linear: ClassVar[bool] = False
 
     @property
     def measured_drive(self) -> bool:
@@ -76,8 +114,29 @@ class CompiledFamily:
 
     @property
     def column(self) -> Array:
-        """Parameters of the plant, shape (p,)."""
-        return np.asarray(self.plant.parameter_rows())
+        """Parameters of the plant and the offset of the clock, shape (p + 1,)."""
+        return np.append(self.plant.parameter_rows(), 0.0)
+
+    @property
+    def lead(self) -> int:
+        """Number of samples by which a replay with early readings advances the setpoints."""
+        return int(np.ceil(self.clock / self.period - 1e-9))
+
+    @cached_property
+    def _advanced(self) -> Array:
+        """Drives with the setpoints advanced within each run, but for its first sample."""
+        if self.lead == 0:
+            return self.drives
+        n = self.drives.shape[1]
+        starts = np.flatnonzero(self.fresh)
+        ends = np.append(starts[1:], n)
+        last = np.repeat(ends, np.diff(ends, prepend=0)) - 1
+        ahead = np.minimum(np.arange(n) + self.lead, last)
+        ahead[starts] = starts
+        made = self.drives.copy()
+        for k in self.commands:
+            made[k] = self.drives[k][ahead]
+        return made
 
     @property
     def loop(self) -> Any:
@@ -85,11 +144,33 @@ class CompiledFamily:
         return self.plant.module("rollout").loop_of(self.plant, True, readings=True)
 
     def simulate(self, columns: Array) -> Array:
-        """Return sensor readings for parameter columns (n, p), shape (channels, T, n)."""
+        """Return sensor readings for parameter columns (n, p + 1), shape (channels, T, n).
+
+        An offset of the clock adds to the dead time; where their sum is below zero, readings
+        precede the recorded setpoints, and these are advanced.
+        """
+        given = columns[:, :-1]
+        if self.lead == 0:
+            return self._run(given, self.drives)
+        given, late = given.copy(), self.plant.names.index("regulator.dead_time")
+        given[:, late] += columns[:, -1]
+        early = given[:, late] < 0.0
+        given[early, late] = np.maximum(given[early, late] + self.lead * self.period, 0.0)
+        if early.all():
+            return self._run(given, self._advanced)
+        if not early.any():
+            return self._run(given, self.drives)
+        made = np.empty((len(columns), len(self.channels), len(self.fresh))).transpose(1, 2, 0)
+        made[:, :, early] = self._run(given[early], self._advanced)
+        made[:, :, ~early] = self._run(given[~early], self.drives)
+        return made
+
+    def _run(self, columns: Array, drives: Array) -> Array:
+        """Return sensor readings with drives for plants' columns (n, p), (channels, T, n)."""
         substeps = max(1, int(np.ceil(self.period / self.longest_step)))
         flags = np.where(self.fresh, BEGIN, 0).astype(np.int64)
         made = run(
-            self.loop, self.plant, columns, self.drives, flags=flags, substeps=substeps,
+            self.loop, self.plant, columns, drives, flags=flags, substeps=substeps,
             period=self.period, before=True, lanes=LANES, parallel=True,
         )  # fmt: skip
         outputs = np.ascontiguousarray(made[: len(self.channels)].transpose(2, 0, 1))
@@ -98,11 +179,14 @@ class CompiledFamily:
     def tie(self, columns: Array) -> None:
         """Complete columns: none needs it."""
 
-    checks: ClassVar[int] = 0
+    @property
+    def checks(self) -> int:
+        """Number of checks of :meth:`violations`."""
+        return 0
 
     def violations(self, columns: Array) -> Array:
         """Return by how much columns are not physical: bounds suffice."""
-        return np.zeros((len(columns), 0))
+        return no_violations(columns)
 
     @property
     def _weights(self) -> int:
@@ -119,6 +203,8 @@ class CompiledFamily:
         """Return the declaration of a free parameter."""
         if name.startswith(WEIGHT):
             return WEIGHTS
+        if name == CLOCK:
+            return OFFSET
         found: Declaration = self.plant.declaration(name)
         return found
 
@@ -128,6 +214,8 @@ class CompiledFamily:
             place = self._weights + int(name.removeprefix(WEIGHT)[:-1])
             usual = {"low": 0.0, "high": 1.0, "scale": 0.02, "prior": 25.0}
             return Free(name, place, **{**usual, "start": float(self.column[place]), **changes})
+        if name == CLOCK:
+            return clock_free(self.clock, len(self.column) - 1, {"prior": CLOCK_PRIOR, **changes})
         d, value = self.declared(name), self.plant.value(name)
         made: dict[str, Any] = {"low": d.low, "high": d.high, "start": value}
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
@@ -140,6 +228,7 @@ class CompiledFamily:
         names = [n for n in self.settings if not (self.measured_drive and in_valve(n))]
         if not self.measured_drive and self.plant.value(PILOT_LAG) != 0.0:
             names += list(PILOT)
+        names += [CLOCK] if self.lead else []
         names += [f"{WEIGHT}{k}]" for k in range(self.elements)]
         present = [
             name
@@ -199,7 +288,7 @@ class CompiledFamily:
 
 def in_valve(name: str) -> bool:
     """Return whether a parameter acts upstream of the pressure."""
-    return name.startswith(("regulator.", "valve."))
+    return name.startswith(("regulator.", "valve.", "clock."))
 
 
 def shut_off(values: Array, recording: Recording) -> Array:
@@ -238,7 +327,7 @@ def regulator_of(
     alone = np.where(pressures[:, None], problem.measured, np.nan)
     if not valve or not np.isfinite(alone).any():
         return family, {}, family.column
-    only = dataclasses.replace(problem, measured=alone)
+    only = dataclasses.replace(problem, measured=alone, violations=no_violations, checks=0)
     orders = [valve]
     if not {f.name for f in valve} & set(PILOT) and family.plant.air == "regulator":
         orders.append((*valve, *(family.free(name, start=start) for name, start in PILOT.items())))
@@ -254,9 +343,25 @@ def calibrate_compiled(
     family: Any, measured: Array, noise: Array, blocks: Blocks, time: Array, shapes: Array
 ) -> Calibration:
     """Fit the base of a plant: the regulator to the pressures alone, then all parameters."""
-    problem = Problem(family.simulate, measured, noise, blocks.train, time, family.tie, shapes)
+    family = family.spanning(measured)
+    problem = Problem(
+        *(family.simulate, measured, noise, blocks.train, time, family.tie, shapes),
+        violations=family.violations,
+        checks=family.checks,
+    )
     family, found, column = regulator_of(problem, family, blocks)
-    problem = dataclasses.replace(problem, simulate=family.simulate, tie=family.tie)
-    start = start_at_guess(family.base(), dict(found))
-    base = fit_base(problem, blocks, column, [start], ROUNDS)
-    return Calibration(family, problem, base, dict(found), None)
+    problem = dataclasses.replace(
+        problem, simulate=family.simulate, tie=family.tie, violations=family.violations
+    )
+    law = family.guess(measured, noise, column)
+    usual = start_at_guess(family.base(), dict(found))
+    starts = [tuple(free for free in usual if free.name not in family.last)]
+    if law:
+        starts.append(start_at_guess(family.base(), {**found, **law}))
+    tried = [fit_base(problem, blocks, column, starts, ROUNDS, boxed) for boxed in family.limits]
+    base = min(tried, key=lambda found: found.fit.cost)
+    if family.last:
+        whole = start_at_guess(family.base(), base.fit.values())
+        base = fit_base(problem, blocks, column, [whole], ROUNDS, boxed=True)
+    guess = family.flexible_guess(base.fit.values())
+    return Calibration(family, problem, base, guess, None, linear=family.linear)

@@ -90,6 +90,10 @@ class ElbowKind(RegulatedKind):
         bound: BoundElbow = super().bind(plant, recording, sheet)
         return bound
 
+    def commanded(self, plant: Any) -> tuple[str, ...]:
+        """Return the inputs of the loop that are setpoints."""
+        return ("command_a", "command_b")
+
     def drives(
         self, plant: Any, recording: Recording, set_points: Sequence[Array]
     ) -> Mapping[str, Array]:

@@ -94,6 +94,10 @@ class KneeKind(RegulatedKind):
         bound: BoundKnee = super().bind(plant, recording, sheet)
         return bound
 
+    def commanded(self, plant: Any) -> tuple[str, ...]:
+        """Return the input of the loop that is the setpoint."""
+        return ("set_point",)
+
     def drives(
         self, plant: Any, recording: Recording, set_points: Sequence[Array]
     ) -> Mapping[str, Array]:

@@ -2,6 +2,8 @@
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,9 +25,18 @@ from pam_envs.diagnosis.families.compiled import (
 )
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration
-from pam_envs.diagnosis.fit.single_muscle import SETTINGS
+from pam_envs.diagnosis.fit.least_squares import no_violations
+from pam_envs.diagnosis.fit.single_muscle import (
+    SETTINGS,
+    clock_of,
+    map_of,
+    not_monotone,
+    with_range,
+)
 from pam_envs.diagnosis.fit.starting_values import Grid
 from pam_envs.diagnosis.plant_protocol import Output
+from pam_envs.muscle.law_correction import NAMES as TERM_NAMES
+from pam_envs.muscle.law_correction import TERMS, LawCorrection
 from pam_envs.plants.core.rollout import drives_of
 from pam_envs.wording import near
 
@@ -37,18 +48,77 @@ REGULATOR: dict[str, dict[str, Any]] = {
 """Settings of the fit of a regulator's parameters."""
 FALL = 0.5 * BAR
 """Fall of a setpoint [Pa] from which a recording shows the exhaust."""
+RANGE = "map_pressure", "map_least", "map_strain"
+"""Parameters of the range of a correction."""
 NOISE = {"angle": 1e-3, "pressure": 1e3, "torque": 0.02, "force": 0.5, "tension": 1.0}
 """RMS of the noise [SI] where a recording shows none, by the first word of a channel."""
 
 
+@dataclass(frozen=True)
 class RegulatedFamily(CompiledFamily):
     """Plant with the inputs of a recording; outputs are readings of sensors, and loads and torques.
 
-    ``channels`` holds names of the plant's sensors, in their order, then of further signals.
+    ``channels`` holds names of the plant's sensors, in their order, then of further signals;
+    ``states`` are recorded pressures [Pa] and strains at which the static law has to be monotone,
+    (2, k).
     """
+
+    states: Array = field(default_factory=lambda: np.zeros((2, 0)))
 
     pairs: ClassVar[Mapping[str, str]]
     """Name of each setpoint to that of its pressure."""
+    law: ClassVar[str] = ""
+    """Component with the correction of the static law."""
+
+    def recorded_states(self, measured: Array) -> Array:
+        """Return groups of pressures [Pa] and strains of readings (channels, T), (2, k)."""
+        return np.zeros((2, 0))
+
+    def law_slopes(self, columns: Array, pressure: Array, strain: Array) -> tuple[Array, ...]:
+        """Return slopes of the laws of columns (n, p), without correction, at states (k,).
+
+        Stiffness over strain [N] and slope by pressure [m2], (n, k), and a usual slope, (n, 1).
+        """
+        raise NotImplementedError
+
+    def spanning(self, measured: Array) -> "RegulatedFamily":
+        """Return the family whose correction of the law spans readings (channels, T)."""
+        states = self.recorded_states(measured) if self.law else self.states
+        plant = self.plant
+        if states.size and not getattr(plant, self.law).corrects:
+            (_, least), (full, most) = states.min(1), states.max(1)
+            ends = {"map_pressure": full, "map_least": least, "map_strain": most - least}
+            plant = with_range(plant, self.law, ends)
+        return dataclasses.replace(self, plant=plant, states=states)
+
+    @property
+    def checks(self) -> int:
+        """Number of checks of the static law."""
+        return 2 * self.states.shape[1]
+
+    def violations(self, columns: Array) -> Array:
+        """Return by how much static laws fail to be monotone, shape (n, checks)."""
+        if not self.states.size:
+            return no_violations(columns)
+        pressure, strain = self.states
+        stiff, gain, usual = self.law_slopes(columns, pressure, strain)
+        sizes = columns[:, [self.plant.names.index(f"{self.law}.{name}") for name in TERM_NAMES]]
+        by_pressure, by_strain = self._correction_slopes
+        return not_monotone(stiff - sizes @ by_strain, gain + sizes @ by_pressure, usual)
+
+    @cached_property
+    def _correction_slopes(self) -> tuple[Array, Array]:
+        """Derivatives of the correction's terms by pressure and strain, each (terms, k)."""
+        law, (pressure, strain) = getattr(self.plant, self.law), self.states
+        return map_of(law, pressure, strain - law.map_least, TERMS)[1:]
+
+    def plant_of(self, column: Array) -> Any:
+        """Return the plant with the parameters of a column; an unused map has its usual range."""
+        made = super().plant_of(column)
+        if not self.law or getattr(made, self.law).corrects:
+            return made
+        usual = {name: getattr(LawCorrection, name) for name in RANGE}
+        return made.replace({f"{self.law}.{name}": value for name, value in usual.items()})
 
     def signal_rows(self) -> Mapping[str, int]:
         """Return the row of state of each signal that is no reading."""
@@ -206,7 +276,14 @@ class RegulatedKind:
         made = {**usual, **given, **self.drives(plant, recording, set_points)}
         channels = [np.broadcast_to(made[name], (len(recording.time),)) for name in usual]
         data = (plant, recording.period, drives_of(channels), recording.restart.copy())
-        return self.bound(*data, regulator if measured else None)
+        if measured:
+            return self.bound(*data, regulator)
+        commands = tuple(list(usual).index(name) for name in self.commanded(plant))
+        return self.bound(*data, None, commands, clock_of(recording, sheet))
+
+    def commanded(self, plant: Any) -> tuple[str, ...]:
+        """Return the inputs of the loop that are setpoints."""
+        return tuple(self.pairs_of(plant).values())
 
     def pairs_of(self, plant: Any) -> Mapping[str, str]:
         """Return the name of each setpoint and that of its pressure."""

@@ -16,7 +16,7 @@ from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import Audit, audit_channels
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.families.compiled import calibrate_compiled
+from pam_envs.diagnosis.families.compiled import UsualStart, calibrate_compiled
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration
 from pam_envs.diagnosis.fit.least_squares import Free
@@ -203,7 +203,7 @@ class Simulator:
 
 
 @dataclass(frozen=True)
-class BoundSimulator:
+class BoundSimulator(UsualStart):
     """Simulation with the inputs of a recording."""
 
     plant: Simulator

@@ -9,23 +9,20 @@ from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import Audit, audit, unmet_needs
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import by_name, catalogue
-from pam_envs.diagnosis.families.compiled import WEIGHTS
+from pam_envs.diagnosis.families.compiled import OFFSET, WEIGHTS
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration, calibrate
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.single_muscle import (
     CLOCK,
-    USUAL_ROWS,
     MuscleFamily,
+    clock_of,
     identified,
     inputs_of,
     start_plant,
 )
 from pam_envs.diagnosis.plant_protocol import Output, Parameter, Signals
-from pam_envs.parameters import Declaration
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-OFFSET = Declaration("s", -1.0, 1.0, "assumed", "offset of the readings' clock", 0.0)
 
 
 class BoundMuscle(MuscleFamily):
@@ -74,9 +71,7 @@ class MuscleKind:
 
     def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundMuscle:
         """Return a muscle with the inputs of a recording."""
-        known = sheet.clock_tolerance
-        clock = USUAL_ROWS * recording.period if known is None else known
-        return BoundMuscle(plant, inputs_of(recording, sheet), clock)
+        return BoundMuscle(plant, inputs_of(recording, sheet), clock_of(recording, sheet))
 
     def audit(self, recording: Recording, sheet: Rig) -> Audit:
         """Return the findings on a recording before its diagnosis."""

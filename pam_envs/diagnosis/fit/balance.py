@@ -194,7 +194,7 @@ class Balance:
         for _ in range(ROUNDS):
             columns = np.vstack([self._law(), self._plays(taper), self._late(stiff)])
             limits = self._limits(area, len(columns))
-            regression = _Regression(columns, self.force, self._weights(stiff), limits)
+            regression = Regression(columns, self.force, self._weights(stiff), limits)
             found = regression.solve(np.arange(len(columns)))
             taper, stiff = self._slopes(found.coefficients)
             area = max(found.coefficients[0], 1e-6)
@@ -238,7 +238,7 @@ class Balance:
         regression, _ = self._whole(frictions)
         return regression.solve(np.arange(len(regression.scale)))
 
-    def _whole(self, frictions: list[Friction]) -> tuple["_Regression", int]:
+    def _whole(self, frictions: list[Friction]) -> tuple["Regression", int]:
         """Return the regression on law, map and friction, and the columns before friction."""
         found, taper, stiff = self._plain
         always = [self._law(), self._plays(taper), self._late(stiff), self._terms()]
@@ -248,7 +248,7 @@ class Balance:
         terms = slice(first - len(always[-1]), first)
         limits.low[terms], limits.precision[terms] = -np.inf, MAP_PRIOR**-2
         rows = self._weights(stiff), limits, self._kept()
-        return _Regression(columns, self.force, *rows), first
+        return Regression(columns, self.force, *rows), first
 
     def _kept(self) -> Array:
         """Return rows of a regression that keep the law near the plain one.
@@ -436,7 +436,7 @@ class Limits:
     precision: Array  # of the prior, over the variance of the target
 
 
-class _Regression:
+class Regression:
     """Least squares on columns with bounds, for many choices of them."""
 
     def __init__(

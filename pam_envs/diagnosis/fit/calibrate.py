@@ -56,6 +56,8 @@ class Calibration:
     base: Candidate
     guess: dict[str, float]  # starting values by parameter, of the base and its differences
     rate: Form | None  # form of the limited rate that the pressure needs
+    # whether a linear model may show that a difference is needed, without a refit
+    linear: bool = True
 
 
 def calibrate(

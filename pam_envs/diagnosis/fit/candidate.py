@@ -105,14 +105,18 @@ def fit_base(
     column: Array,
     starts: Sequence[tuple[lsq.Free, ...]],
     rounds: int = 25,
+    boxed: bool = False,
 ) -> Candidate:
-    """Fit the base parameters of a plant, from the best of several starts."""
+    """Fit the base parameters of a plant, from the best of several starts.
+
+    ``boxed`` is that of :func:`improve`.
+    """
     fits = lsq.promising(problem, [lsq.Fit.at_start(frees, column) for frees in starts])
     if len(fits) > 1:
-        lsq.improve(problem, fits, RACE, 1e-5)
+        lsq.improve(problem, fits, RACE, 1e-5, boxed=boxed)
         rounds -= RACE
     fit = min(fits, key=lambda f: f.cost)
-    lsq.improve(problem, [fit], rounds, 1e-5)
+    lsq.improve(problem, [fit], rounds, 1e-5, boxed=boxed)
     complete_jacobian(problem, fit)
     return Candidate((), fit, blocks.errors(problem.rows(fit.residual)))
 

@@ -91,6 +91,14 @@ CLOCK = "clock.offset"
 """Time [s] by which the readings lag the command: no parameter of the plant."""
 USUAL_ROWS = 2.5
 """Sampling periods within which the clocks of command and readings agree, if not declared."""
+
+
+def clock_of(recording: Any, rig: Any) -> float:
+    """Return the largest offset of the readings' clock [s]."""
+    known = rig.clock_tolerance
+    return USUAL_ROWS * recording.period if known is None else known  # type: ignore[no-any-return]
+
+
 PLAIN_NEUTRAL = {
     "regulator.dead_time": 0.0,
     "regulator.slew_rate": 1e9,
@@ -188,9 +196,7 @@ class MuscleFamily:
         slopes, gains = self._map_slopes
         stiff = stiff - np.tensordot(sizes, slopes, 1)
         gain = gain + np.tensordot(sizes, gains, 1)
-        lacks = np.maximum(0.0, LEAST_STIFFNESS - stiff / LEAST_STIFFNESS_OF)
-        flat = np.maximum(0.0, LEAST_GAIN - gain / area)
-        return NOT_MONOTONE * np.concatenate([lacks, flat], axis=1)
+        return not_monotone(stiff, gain, area)
 
     @cached_property
     def _map_slopes(self) -> tuple[Array, Array]:
@@ -206,10 +212,7 @@ class MuscleFamily:
             start = float(self.column[R.WEIGHT + k])
             return Free(name, R.WEIGHT + k, **{**weight, "start": start, **changes})
         if name == CLOCK:
-            made = dict(
-                low=-self.clock, high=self.clock, scale=0.01, start=0.0, prior=50 * self.clock
-            )
-            return Free(name, len(self.column) - 1, **{**made, **changes})
+            return clock_free(self.clock, len(self.column) - 1, changes)
         d, value = self.plant.declaration(name), self.plant.value(name)
         made = dict(low=d.low, high=d.high, start=value)
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
@@ -254,7 +257,26 @@ class MuscleFamily:
         return self.plant.replace_with_substeps(values)
 
 
-def map_of(law: Any, pressure: Array, strain: Array) -> tuple[Array, Array, Array]:
+def clock_free(most: float, place: int, changes: Mapping[str, Any]) -> Free:
+    """Return the fit settings of the offset of a clock, at most ``most`` [s]."""
+    made = dict(low=-most, high=most, scale=0.01, start=0.0, prior=50 * most)
+    return Free(CLOCK, place, **{**made, **changes})
+
+
+def not_monotone(stiff: Array, gain: Array, area: Array) -> Array:
+    """Return by how much laws fail to be monotone, over a tolerance, shape (n, 2 k).
+
+    ``stiff`` (n, k) is the stiffness over strain [N], ``gain`` (n, k) the slope of the force by
+    pressure [m2], and ``area`` (n, 1) a usual slope.
+    """
+    lacks = np.maximum(0.0, LEAST_STIFFNESS - stiff / LEAST_STIFFNESS_OF)
+    flat = np.maximum(0.0, LEAST_GAIN - gain / area)
+    return NOT_MONOTONE * np.concatenate([lacks, flat], axis=1)
+
+
+def map_of(
+    law: Any, pressure: Array, strain: Array, terms: Sequence[tuple[int, int]] = MAP_TERMS
+) -> tuple[Array, Array, Array]:
     """Return the terms of a map at pressures [Pa] and strains (k,), and their derivatives by each.
 
     Each has the shape (terms, k); beyond the range of the map they are those of its edge.
@@ -262,16 +284,15 @@ def map_of(law: Any, pressure: Array, strain: Array) -> tuple[Array, Array, Arra
     u = np.clip(2.0 * pressure / law.map_pressure - 1.0, -1.0, 1.0)
     s = np.clip(2.0 * strain / law.map_strain - 1.0, -1.0, 1.0)
     eye = np.eye(6)
-    of = np.array([chebval(u, eye[p]) for p, _ in MAP_TERMS])
-    by = np.array([chebval(u, chebder(eye[p])) * 2.0 / law.map_pressure for p, _ in MAP_TERMS])
-    of_e = np.array([chebval(s, eye[q]) for _, q in MAP_TERMS])
-    by_e = np.array([chebval(s, chebder(eye[q])) * 2.0 / law.map_strain for _, q in MAP_TERMS])
+    of = np.array([chebval(u, eye[p]) for p, _ in terms])
+    by = np.array([chebval(u, chebder(eye[p])) * 2.0 / law.map_pressure for p, _ in terms])
+    of_e = np.array([chebval(s, eye[q]) for _, q in terms])
+    by_e = np.array([chebval(s, chebder(eye[q])) * 2.0 / law.map_strain for _, q in terms])
     return of * of_e, by * of_e, of * by_e
 
 
-UNUSED_MAP = {
-    f"muscle.{name}": getattr(EffectiveAreaMuscle, name) for name in ("map_pressure", "map_strain")
-}
+RANGE = "map_pressure", "map_strain"
+UNUSED_MAP = {f"muscle.{name}": getattr(EffectiveAreaMuscle, name) for name in RANGE}
 """Range of a map without terms."""
 
 
@@ -280,10 +301,18 @@ def states_of(contraction: Array, pressure: Array, plant: SingleMuscle) -> Array
 
     ``contraction`` [m] and ``pressure`` [Pa] have the shape (T,), NaN where there is no reading.
     """
-    seen = np.isfinite(contraction) & np.isfinite(pressure)
+    return grouped(contraction / plant.muscle.rest_length, pressure)
+
+
+def grouped(strain: Array, pressure: Array, slack: bool = True) -> Array:
+    """Return :func:`states_of` readings of strain and pressure [Pa], (T,).
+
+    ``slack``: with states without pressure.
+    """
+    seen = np.isfinite(strain) & np.isfinite(pressure)
     if not seen.any():
         return np.zeros((2, 0))
-    found = np.array([pressure[seen], contraction[seen] / plant.muscle.rest_length])
+    found = np.array([pressure[seen], strain[seen]])
     low, high = found.min(axis=1), found.max(axis=1)
     spans = np.maximum(high - low, 1e-9)[:, None] / np.reshape(LEVELS, (2, 1))
     levels = np.minimum((found - low[:, None]) // spans, np.reshape(LEVELS, (2, 1)) - 1.0)
@@ -293,18 +322,25 @@ def states_of(contraction: Array, pressure: Array, plant: SingleMuscle) -> Array
     steps = np.vstack([np.zeros(2), np.diag(spans[:, 0]), -np.diag(spans[:, 0])])
     near = (middle[:, None] + steps.T[:, :, None]).reshape(2, -1)
     near[0] = np.maximum(near[0], 0.0)
-    slack = np.linspace(0.0, REACH * high[1], LEVELS[1])  # where a start looks for its rest
-    return np.hstack([near, [np.zeros(LEVELS[1]), slack]])
+    if not slack:
+        return near
+    empty = np.linspace(0.0, REACH * high[1], LEVELS[1])  # where a start looks for its rest
+    return np.hstack([near, [np.zeros(LEVELS[1]), empty]])
 
 
 def spanning(plant: SingleMuscle, states: Array) -> SingleMuscle:
     """Return a plant whose map, if it has none yet, spans recorded states (:func:`states_of`)."""
     if plant.muscle.finer or not states.size:
         return plant
+    return with_range(plant, "muscle", dict(zip(RANGE, MARGIN * states.max(1), strict=True)))
+
+
+def with_range(plant: P, component: str, ends: Mapping[str, float]) -> P:
+    """Return a plant with the range of the map of a component, within its bounds."""
     made = {}
-    for name, end in zip(("muscle.map_pressure", "muscle.map_strain"), states.max(1), strict=True):
-        bounds = plant.declaration(name)
-        made[name] = float(np.clip(MARGIN * end, bounds.low, bounds.high))
+    for name, end in ends.items():
+        bounds = plant.declaration(f"{component}.{name}")
+        made[f"{component}.{name}"] = float(np.clip(end, bounds.low, bounds.high))
     return plant.replace(made)
 
 

@@ -120,7 +120,7 @@ def muscle_torque(
         ])  # fmt: skip
         drag = friction.stiffness(pressures) * (x - straight - felt)
         slide = muscle.viscosity * pressures * -rate * speed / muscle.rest_length
-        forces = gains * muscle.law(pressures, x) - drag - slide
+        forces = gains * muscle.corrected(pressures, x) - drag - slide
         return float(-np.sum(np.maximum(0.0, forces) * rate))
 
     return torque

@@ -9,6 +9,10 @@ from typing import Any
 
 from pam_envs.constants import DENSITY_PER_PRESSURE
 from pam_envs.kernels.build import LANES, kernel
+from pam_envs.kernels.yielding import deflected
+from pam_envs.muscle.effects import LengthYieldEffects, yield_spring
+from pam_envs.muscle.law_correction import correction_force, correction_slope
+from pam_envs.parameters import declarations
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.pair import (
     N_PAIRS,
@@ -29,6 +33,10 @@ from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.pneumatics.enclosed_air import REACHED, air_stiffness, enclose, flows_on
 from pam_envs.pneumatics.regulator import AIR_STATE
 
+RATIO = list(declarations(LengthYieldEffects)).index("yield_ratio")
+SOFTEST = 1e-6
+"""Least stiffness of the friction [N] to which that of yielding friction is related."""
+friction_of: Any = None  # placeholder: see pair
 FULL_ANGLE, FULL_PRESSURE = 0.5236, 6.5e5
 """Full scales of the sensors [rad, Pa]."""
 
@@ -92,6 +100,61 @@ def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def yield_of(rows: Any, fixed: Any, j: int, m: int) -> tuple[float, float]:
+    """Return the deflection of the yielding friction of muscle ``m``, and its slope, in lane ``j``.
+
+    At the contraction of the muscle, from where the friction was last.
+    """
+    _, limit = yield_spring(fixed, j, PAIR.soft, rows[PAIR.effective + m][j])
+    moved = rows[PAIR.at + m][j] - rows[PAIR.yielded + m][j]
+    return deflected(rows[PAIR.deflection + m][j], moved, limit, fixed[PAIR.soft + RATIO][j])  # type: ignore[no-any-return]
+
+
+@kernel
+def yield_share(rows: Any, fixed: Any, j: int, m: int) -> float:
+    """Return the stiffness of the yielding friction over that of the other friction."""
+    stiff, _ = yield_spring(fixed, j, PAIR.soft, 0.0)
+    return stiff / max(SOFTEST, friction_of(fixed, j, rows[PAIR.effective + m][j]))  # type: ignore[no-any-return]
+
+
+@kernel
+def peek_yield(rows: Any, fixed: Any, m: int, operators: int, first: int, last: int) -> None:
+    """Add the lags of the yielding friction of muscles from ``m`` on; it does not move."""
+    for k in range(m, m + operators):
+        for j in range(first, last):
+            deflection, slope = yield_of(rows, fixed, j, k)
+            share = yield_share(rows, fixed, j, k)
+            rows[PAIR.lag + k][j] = rows[PAIR.lag + k][j] + share * deflection
+            rows[PAIR.stick + k][j] = rows[PAIR.stick + k][j] + share * slope
+
+
+@kernel
+def move_yield(rows: Any, fixed: Any, m: int, operators: int, first: int, last: int) -> None:
+    """Move the yielding friction of muscles from ``m`` on to their contractions; add its lags."""
+    for k in range(m, m + operators):
+        for j in range(first, last):
+            deflection, _ = yield_of(rows, fixed, j, k)
+            rows[PAIR.deflection + k][j], rows[PAIR.yielded + k][j] = (
+                deflection,
+                rows[PAIR.at + k][j],
+            )
+            share = yield_share(rows, fixed, j, k)
+            rows[PAIR.lag + k][j] = rows[PAIR.lag + k][j] + share * deflection
+
+
+@kernel
+def corrected_force(fixed: Any, j: int, pressure: float, contraction: float) -> float:
+    """Return the force [N] of the law's correction at an effective pressure [Pa]."""
+    return correction_force(fixed, j, PAIR.law, pressure, contraction)  # type: ignore[no-any-return]
+
+
+@kernel
+def corrected_stiffness(fixed: Any, j: int, pressure: float, contraction: float) -> float:
+    """Return minus the derivative of :func:`corrected_force` by contraction [N]."""
+    return correction_slope(fixed, j, PAIR.law, pressure, contraction)  # type: ignore[no-any-return]
+
+
+@kernel
 def leaked_air(rows: Any, fixed: Any, j: int) -> float:
     """Return the air [kg] that leaked from all muscles of lane ``j`` in this control period."""
     leaked = 0.0
@@ -145,4 +208,6 @@ def pair_kernels(kind: str, layout: Any, pairs: int, effects: int | None) -> dic
     begin = begin_paths_and_bearing if "bearing" in block._fields else begin_paths
     air = {"settle_air": settle_air, "begin_enclosed": begin_enclosed}
     air |= {"enclosed_stiffness": enclosed_stiffness, "leaked_air": leaked_air}
+    air |= {"more_force": corrected_force, "more_stiffness": corrected_stiffness}
+    air |= {"peek_yield": peek_yield, "move_yield": move_yield}
     return found | shown | air | {"regulate": regulate_extended, "begin_muscles": begin}

@@ -49,11 +49,12 @@ def pair_rows(layout: Any, effects: int | None) -> Any:
     found = {n: getattr(layout, n.upper(), None) for n in ROWS.split()}
     found = {n: getattr(layout, f"{n.upper()}_A") if r is None else r for n, r in found.items()}
     if effects is None:
-        found |= {"effective": found["pressure"], "paths": 0}
+        found |= {"effective": found["pressure"], "paths": 0, "deflection": 0, "yielded": 0}
     else:
         own = layout.STATE
         found |= {"effective": effects + own.effective, "paths": effects + own.paths}
-    found |= {"path": layout.EFFECT.path, "warm": layout.EFFECT.warm}
+        found |= {"deflection": effects + own.deflection, "yielded": effects + own.yielded}
+    found |= {name: getattr(layout.EFFECT, name) for name in ("path", "warm", "law", "soft")}
     return namedtuple("PairRows", tuple(found))(**found)
 
 
@@ -91,6 +92,18 @@ def settle_air(rows: Any, fixed: Any, h: float, work: Any) -> None:
 @kernel
 def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
     """Begin the enclosed air of the muscles of lane ``j``: a plain plant has regulators."""
+
+
+@kernel
+def more_force(fixed: Any, j: int, pressure: float, contraction: float) -> float:
+    """Return the force [N] of the law's correction: a plain plant has none."""
+    return 0.0
+
+
+@kernel
+def more_stiffness(fixed: Any, j: int, pressure: float, contraction: float) -> float:
+    """Return minus the derivative of :func:`more_force` by contraction [N]."""
+    return 0.0
 
 
 @kernel
@@ -166,6 +179,16 @@ def write_limits(
 
 
 @kernel
+def peek_yield(rows: Any, fixed: Any, m: int, operators: int, first: int, last: int) -> None:
+    """Add the lags of yielding friction, which does not move: a plain plant has none."""
+
+
+@kernel
+def move_yield(rows: Any, fixed: Any, m: int, operators: int, first: int, last: int) -> None:
+    """Move yielding friction and add its lags: a plain plant has none."""
+
+
+@kernel
 def lag_of(
     rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, operators: int,
     first: int, last: int,
@@ -176,6 +199,7 @@ def lag_of(
         rows, fixed, counts, table, hysteresis, elements, PAIR.at, PAIR.lag, operators, PAIR.model,
         K.STACK_COUNT, K.MEMBER, first, last,
     )  # fmt: skip
+    move_yield(rows, fixed, 0, operators, first, last)
 
 
 @kernel
@@ -189,6 +213,7 @@ def peek_at(
         rows, fixed, counts, table, hysteresis, elements, PAIR.at + m, PAIR.lag + m,
         PAIR.stick + m, operators, PAIR.model, K.STACK_COUNT + m, K.MEMBER, first, last,
     )  # fmt: skip
+    peek_yield(rows, fixed, m, operators, first, last)
 
 
 @kernel
@@ -249,8 +274,9 @@ def pulled(
     area, passive, less, more = terms_of(fixed, j, contraction)
     gain = gain_of(fixed, j, side)
     drag = friction_of(fixed, j, pressure) * lag + fixed[K.MUSCLE_VISCOSITY][j] * pressure * speed
-    force = gain * (pressure * area - passive) - drag
-    return max(0.0, force), gain * (pressure * less + more) if force > 0.0 else 0.0
+    force = gain * (pressure * area - passive + more_force(fixed, j, pressure, contraction)) - drag
+    slope = pressure * less + more + more_stiffness(fixed, j, pressure, contraction)
+    return max(0.0, force), gain * slope if force > 0.0 else 0.0
 
 
 @kernel
@@ -265,9 +291,12 @@ def pulled_twice(
     """
     area, passive, less, more = terms_of(fixed, j, contraction)
     gain, middle = gain_of(fixed, j, side), 0.5 * (was + pressure)
-    old = gain * (was * area - passive) - friction_of(fixed, j, was) * lag
-    new = gain * (pressure * area - passive) - friction_of(fixed, j, pressure) * lag
-    slope = gain * (middle * less + more) + friction_of(fixed, j, middle) * stick
+    old = gain * (was * area - passive + more_force(fixed, j, was, contraction))
+    old = old - friction_of(fixed, j, was) * lag
+    new = gain * (pressure * area - passive + more_force(fixed, j, pressure, contraction))
+    new = new - friction_of(fixed, j, pressure) * lag
+    slope = gain * (middle * less + more + more_stiffness(fixed, j, middle, contraction))
+    slope = slope + friction_of(fixed, j, middle) * stick
     drag = fixed[K.MUSCLE_VISCOSITY][j] * middle
     tight = 1.0 if old + new > 2.0 * drag * speed else 0.0
     return tight * old, tight * new, tight * slope, tight * drag

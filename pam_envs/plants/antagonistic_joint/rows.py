@@ -32,8 +32,19 @@ globals().update(
         )
         | {"delay": 2 * DELAYED.end},
         (*STAGE, *dotted(link="length mass centre gyration gravity", nominal="pole stiffness")),
-        path_effects("muscle", bearing="link", sensors=("angle", "pressure")),
-        {"effective": 2, "paths": 2 * PATH_STATE.end, "stuck": 1, "sensors": sensor_rows(3)},
+        path_effects(
+            *("muscle",),
+            bearing="link",
+            sensors=("angle", "pressure"),
+            law="muscle",
+            yields="muscle",
+        ),
+        {
+            **each("effective deflection yielded", 2),
+            "paths": 2 * PATH_STATE.end,
+            "stuck": 1,
+            "sensors": sensor_rows(3),
+        },
         operators=2,
     )
 )

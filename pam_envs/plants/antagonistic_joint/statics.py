@@ -132,7 +132,7 @@ class PairPlant(Plant):
         start = self.hysteresis.model.initial_state((cycles,))
 
         def law(p: Array, angle: Array) -> Array:
-            forces = gains * self.muscle.law(p.T, self.lever.contraction(angle, length))
+            forces = gains * self.muscle.corrected(p.T, self.lever.contraction(angle, length))
             return -np.sum(forces * self.lever.rate(angle), axis=-1)
 
         def force(p: Array, angle: Array, states: Any) -> tuple[Array, Any]:

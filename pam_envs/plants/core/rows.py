@@ -13,10 +13,13 @@ from typing import Any
 
 from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.mechanics.guide import GUIDE
-from pam_envs.parameters import row_blocks
+from pam_envs.muscle.effects import LengthYieldEffects
+from pam_envs.muscle.law_correction import FIELDS
+from pam_envs.parameters import declarations, row_blocks
 from pam_envs.plants.core.muscle_path import PATH_NAMES, WARM
 from pam_envs.sensing.sensor import SENSOR
 
+YIELD_FIELDS = tuple(declarations(LengthYieldEffects))
 COUNTS = ("key_a", "key_b", "episode", "step", "member")
 """Whole numbers of every plant; a count for each hysteresis operator follows."""
 
@@ -37,16 +40,23 @@ def signal_rows(rows: Any, names: str) -> dict[str, int]:
 
 
 def path_effects(
-    *muscles: str, bearing: str | None = None, sensors: tuple[str, ...]
+    *muscles: str,
+    bearing: str | None = None,
+    sensors: tuple[str, ...],
+    law: str | None = None,
+    yields: str | None = None,
 ) -> dict[str, tuple[str, ...]]:
-    """Return the names of the effects of muscle paths, a bearing and sensors, by block.
+    """Return the names of the effects of muscle paths, a bearing, sensors and a law, by block.
 
-    ``muscles`` are the components that have a temperature each (see ``core.muscle_path``).
+    ``muscles`` are the components that have a temperature each (see ``core.muscle_path``), ``law``
+    is that with the correction of the static law, ``yields`` that with yielding friction.
     """
     rubs = {"bearing": dotted(**{bearing: " ".join(GUIDE._fields)})} if bearing else {}
     warm = {"warm": dotted(**dict.fromkeys(muscles, " ".join(WARM._fields)))}
     shown = {sensor: dotted(**{sensor: " ".join(SENSOR._fields)}) for sensor in sensors}
-    return {"path": PATH_NAMES} | warm | rubs | shown
+    maps = {"law": dotted(**{law: " ".join(FIELDS)})} if law else {}
+    soft = {"soft": dotted(**{yields: " ".join(YIELD_FIELDS)})} if yields else {}
+    return {"path": PATH_NAMES} | warm | rubs | shown | maps | soft
 
 
 def layout(

@@ -29,9 +29,9 @@ globals().update(
         | each("payload slack air straight share")
         | {"delay": 2 * MOST_STAGES * DELAYED.end},
         (*STAGE, *dotted(arm="mass_factor damping_factor")),
-        path_effects("muscle", sensors=("angle", "pressure")),
+        path_effects("muscle", sensors=("angle", "pressure"), law="muscle", yields="muscle"),
         {
-            "effective": 2 * MOST_STAGES,
+            **each("effective deflection yielded", 2 * MOST_STAGES),
             "paths": 2 * MOST_STAGES * PATH_STATE.end,
             "sensors": sensor_rows(3 * MOST_STAGES),
         },

@@ -50,21 +50,22 @@ def campaign(seed: int = 1, share: float = 1.0) -> tuple[dict[str, Array], list[
         values = [value for _, value in corners]
         return np.interp(np.arange(0.0, times[-1], PERIOD), times, values)
 
-    def steps(number: int, least: float, most: float) -> Array:
+    def steps(number: int, least: float, most: float) -> list[Array]:
         holds = [round(random.uniform(1.2, 2.8) / PERIOD) for _ in range(round(share * number))]
-        return np.concatenate([np.full(n, random.uniform(least, most)) for n in holds])
+        return [np.full(n, random.uniform(least, most)) for n in holds]
 
     time = np.arange(0.0, 12.0 * share, PERIOD)
     slow = ramp((0, 0), (4, 0), (6, 1.6e5), (12, -1.6e5), (6, 0))
     turns = ramp((0, 0), (4, 1.2e5), (8, -1.2e5), (6, 0.6e5), (4, -0.6e5), (3, 0))
     sweep = 1.4e5 * np.sin(2.0 * np.pi * (0.2 + 0.05 / share * time) * time)
-    shuffled = steps(9, -1.6e5, 1.6e5)
-    a = steps(9, 0.5e5, 4e5)
+    stepped = np.concatenate(steps(9, -1.6e5, 1.6e5))
+    holds = steps(9, 0.5e5, 4e5)
+    others = [holds[k] for k in random.permutation(len(holds))]
     parts = {
         "triangle": (2e5 + slow, 2e5 - slow),
-        "steps": (2.2e5 + shuffled, 2.2e5 - shuffled),
+        "steps": (2.2e5 + stepped, 2.2e5 - stepped),
         "sweep": (2.5e5 + sweep, 2.5e5 - sweep),
-        "independent": (a, random.permutation(a)),
+        "independent": (np.concatenate(holds), np.concatenate(others)),
         "turns": (2.2e5 + turns, 2.2e5 - turns),
     }
     inputs = {

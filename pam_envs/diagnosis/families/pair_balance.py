@@ -1,0 +1,204 @@
+"""Regression of the torque balance of joints between pairs of muscles: where fits of them start.
+
+At slow motion the torques of both muscles balance weight and payload. The law of the muscles is
+linear in its coefficients, and so is the friction for given limits of its elements. The target is
+the torque of the pressures on the usual area, since most samples have no other known torque; the
+payload gives the scale. Errors of the torque are weighed by the compliance, so that the regression
+minimises errors of the angle.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from pam_envs.arrays import Array, Flags
+from pam_envs.diagnosis.fit.balance import (
+    REVERSAL,
+    Limits,
+    Regression,
+    slipping,
+    without_jitter,
+)
+
+SLOW = 0.15  # speed [rad/s] below which a sample is an equilibrium of torques
+SETTLED = 0.06  # slow way [rad] after which the friction has forgotten a fast motion
+WINDOW = 0.1  # [s] over which angles are averaged
+FEWEST, MOST = 200, 4000  # least and largest number of samples
+ROUNDS = 4
+TAUT = 1.0  # least force [N] of a muscle that is not slack
+CLEARLY = 8e4  # pressure [Pa] above which a muscle is taken for taut at first
+LEAST_STIFF = 0.3  # least stiffness of a weight, over the median
+BRAIDS = (0.01, 0.02, 0.04, 0.08)
+"""Tried strains over which the resistance of the braid builds up."""
+GROWTHS = (0.0, 1e-6, 3e-6, 1e-5, 1e-4)
+"""Tried growths of the friction with pressure [1/Pa]."""
+USUAL_WEIGHTS = 0.8
+"""Sum of the weights of the friction's elements."""
+SCALES, WEIGHTS = (0.7, 1.4), (0.5, 2.0)
+"""Bounds of the usual area over that of the muscles, and of the own weight over the usual one."""
+LAW = ("area", "taper", "threshold", "braid_force", "stiffness")
+
+
+@dataclass(frozen=True)
+class PairBalance:
+    """Readings of joints and their muscles, and a plant with a law of pairs.
+
+    Attributes
+    ----------
+    plant : PairPlant
+    reference : float
+        Pressure [Pa] at which the friction has its usual limits.
+    angle, noise : ndarray, shape (n, T) and float
+        Of the joints [rad], NaN where there is no reading.
+    pressure : ndarray, shape (2 n, T)
+        Of the muscles [Pa].
+    weight, carried : ndarray, shape (n, T)
+        Torque [N m] of the plant's own weight and of the payload, which oppose the muscles.
+    period : float
+        Sampling period [s].
+    """
+
+    plant: Any
+    reference: float
+    angle: Array
+    noise: float
+    pressure: Array
+    weight: Array
+    carried: Array
+    period: float
+
+    @cached_property
+    def _smooth(self) -> Array:
+        """Angles (n, T) without noise, complete."""
+        window, made = max(3, round(WINDOW / self.period)), []
+        for angle in self.angle:
+            seen = np.flatnonzero(np.isfinite(angle))
+            known = np.interp(np.arange(len(angle)), seen, angle[seen])
+            made.append(without_jitter(uniform_filter1d(known, window), REVERSAL * self.noise))
+        return np.array(made)
+
+    @cached_property
+    def _slow(self) -> Flags:
+        """Samples (T,) at which all joints have moved slowly for some way.
+
+        A fast motion may overshoot, and leaves the friction in a state that the readings hide.
+        """
+        window = max(3, round(2.0 * WINDOW / self.period))
+        speed = np.abs(np.gradient(self._smooth, self.period, axis=1))
+        slow = uniform_filter1d(speed.max(axis=0), window) < SLOW
+        way = np.cumsum(speed.min(axis=0)) * self.period
+        since = np.maximum.accumulate(np.where(slow, 0.0, way))
+        slow &= (way - since > SETTLED) & np.isfinite(self.angle).all(axis=0)
+        rows = np.flatnonzero(slow)
+        kept = np.zeros(len(slow), bool)
+        kept[rows[:: max(1, len(rows) // MOST)]] = True
+        return kept
+
+    @cached_property
+    def _geometry(self) -> tuple[Array, Array, Array]:
+        """Strain, ``dL/dphi`` [m] and its derivative [m] of the muscles, (2 n, T)."""
+        lever, length = self.plant.lever, self.plant.muscle.rest_length
+        step = 1e-4
+        strain = lever.contraction(self._smooth, length)
+        rate = lever.rate(self._smooth)
+        curve = (lever.rate(self._smooth + step) - lever.rate(self._smooth - step)) / (2.0 * step)
+        joints, samples = self._smooth.shape
+        shape = (2 * joints, samples)
+        return (
+            strain.transpose(0, 2, 1).reshape(shape),
+            rate.transpose(0, 2, 1).reshape(shape),
+            curve.transpose(0, 2, 1).reshape(shape),
+        )
+
+    def _law(self, braid: float) -> Array:
+        """Return the forces by coefficient of the law, (5, 2 n, T)."""
+        strain, p = self._geometry[0], self.pressure
+        e = strain / self.plant.muscle.stretch
+        return np.array([p, -p * e, -np.ones_like(p), np.expm1(-e / braid), -e])
+
+    def _friction(self, growth: float) -> Array:
+        """Return the forces by element of the friction, (elements, 2 n, T)."""
+        thresholds = self.plant.hysteresis.operator.thresholds
+        limit = (1.0 + growth * self.pressure) / (1.0 + growth * self.reference)
+        made = np.zeros((len(thresholds), *self.pressure.shape))
+        for k, threshold in enumerate(thresholds):
+            for m, path in enumerate(self._geometry[0]):
+                slipping(np.ascontiguousarray(path), threshold * limit[m], made[k, m])
+        return -made
+
+    def solve(self) -> dict[str, float]:
+        """Return parameters of law and friction; empty if slow samples are too few.
+
+        ``weight`` is the factor on the plant's own weight.
+        """
+        if self._slow.sum() < FEWEST:
+            return {}
+        return min((self._solved(b, g) for b, g in product(BRAIDS, GROWTHS)), key=_error)[1]
+
+    def _solved(self, braid: float, growth: float) -> tuple[float, dict[str, float]]:
+        """Return the squared error over the noise, and the parameters."""
+        rows = self._slow
+        forces = np.concatenate([self._law(braid), self._friction(growth)])[:, :, rows]
+        strain, rate, curve = (values[:, rows] for values in self._geometry)
+        pressure = self.pressure[:, rows]
+        taut = pressure > CLEARLY
+        joints = len(self.angle)
+        weight, carried = self.weight[:, rows], self.carried[:, rows]
+        limits, usual = self._limits(len(forces) + 1), self.plant.muscle.area
+        stiff = np.full(weight.shape, 1.0)
+        error, c = np.inf, np.zeros(len(forces) + 1)
+        for k in range(ROUNDS):
+            by_muscle = -forces * rate * taut
+            torque = by_muscle.reshape(len(forces), joints, 2, -1).sum(axis=2)
+            opposed = np.stack([weight, carried])
+            columns = np.concatenate([-torque[1:], opposed]).reshape(len(forces) + 1, -1)
+            kept = taut.reshape(joints, 2, -1).all(axis=1) if k == 0 else np.ones_like(weight, bool)
+            floor = LEAST_STIFF * float(np.median(stiff))
+            weights = (kept / (np.maximum(stiff, floor) * self.noise)).ravel()
+            regression = Regression(columns, usual * torque[0].ravel(), weights, limits)
+            found = regression.solve(np.arange(len(columns)))
+            scale = 1.0 / found.coefficients[-1] if carried.any() else 1.0
+            c = scale * np.append(usual, found.coefficients[:-1])
+            error = found.error / kept.mean()
+            force = np.tensordot(c[:-1], forces, 1)
+            taut = force > TAUT
+            e = strain / self.plant.muscle.stretch
+            steep = c[1] * pressure + c[3] / braid * np.exp(-e / braid) + c[4]
+            steep = steep * rate**2 / self.plant.muscle.rest_length * taut
+            turned = (steep + force * curve * taut).reshape(joints, 2, -1).sum(axis=1)
+            stiff = np.maximum(turned + np.abs(weight), 1e-3)
+        return error, self._named(c, braid, growth)
+
+    def _limits(self, columns: int) -> Limits:
+        """Return the limits of the coefficients."""
+        limits = Limits(
+            low=np.zeros(columns),
+            high=np.full(columns, np.inf),
+            centre=np.zeros(columns),
+            precision=np.zeros(columns),
+        )
+        limits.low[-1], limits.high[-1] = SCALES
+        limits.low[-2], limits.high[-2] = WEIGHTS
+        return limits
+
+    def _named(self, c: Array, braid: float, growth: float) -> dict[str, float]:
+        """Return the coefficients by parameter."""
+        area = max(float(c[0]), 1e-6)
+        found = {f"muscle.{name}": float(v) for name, v in zip(LAW, c, strict=False)}
+        found |= {"muscle.taper": found["muscle.taper"] / area, "muscle.braid_strain": braid}
+        n = len(self.plant.hysteresis.operator.thresholds)
+        sizes = c[len(LAW) : len(LAW) + n]
+        stiffness = max(float(sizes.sum()) / USUAL_WEIGHTS, 1.0)
+        base = stiffness / (1.0 + growth * self.reference)
+        found |= {"hysteresis.base": base, "hysteresis.rate": base * growth}
+        found |= {f"hysteresis.weight[{k}]": float(v) / stiffness for k, v in enumerate(sizes)}
+        return found | {"weight": float(c[-1])}
+
+
+def _error(solved: tuple[float, Mapping[str, float]]) -> float:
+    return solved[0]

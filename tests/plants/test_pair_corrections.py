@@ -1,0 +1,134 @@
+"""Correction of the static law and yielding friction of the muscles of a pair."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from pam_envs.kernels.yielding import deflected
+from pam_envs.muscle.law_correction import FIELDS, NAMES, correction_force, correction_slope
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
+
+JOINT = AntagonisticJoint.paper("none").with_lag_alone()
+TERMS = {f"muscle.{name}": 3.0 - 0.4 * k for k, name in enumerate(NAMES)}
+CORRECTION = {"muscle.map_02": 4.0, "muscle.map_13": -3.0, "muscle.map_20": 6.0}
+RANGE = {"muscle.map_least": 0.02, "muscle.map_strain": 0.2, "muscle.map_pressure": 5e5}
+YIELDING = {
+    "muscle.yield_force": 4.0,
+    "muscle.yield_per_pressure": 1e-5,
+    "muscle.yield_break": 0.003,
+    "muscle.yield_ratio": 0.4,
+}
+CYCLE, BEGUN = 720, 100
+"""Control periods of a cycle of pressures, and of the way to its first pressure."""
+
+
+@pytest.mark.parametrize("strain", [0.05, 0.12, 0.2])
+@pytest.mark.parametrize("pressure", [0.5e5, 2e5, 4e5])
+def test_compiled_correction_is_that_of_the_law_and_its_slope_the_derivative(pressure, strain):
+    law = JOINT.replace(TERMS | RANGE).muscle
+    rows = np.array([[getattr(law, name)] for name in FIELDS])
+    force = correction_force(rows, 0, 0, pressure, strain)
+    assert force == pytest.approx(float(law.correction(pressure, strain)), rel=1e-9)
+    low, high = (float(law.correction(pressure, strain + d)) for d in (-1e-6, 1e-6))
+    slope = correction_slope(rows, 0, 0, pressure, strain)
+    assert slope == pytest.approx((low - high) / 2e-6, rel=1e-6)
+
+
+def test_joint_settles_where_the_corrected_torques_balance_the_weight():
+    plant = JOINT.replace(CORRECTION | RANGE)
+    pressures = np.full(400, 3e5), np.full(400, 1.5e5)
+    angle, plain = (
+        simulate_joint(p, pressures=pressures, compiled=False)["angle"][-1] for p in (plant, JOINT)
+    )
+    assert abs(angle - plain) > 1e-3
+    missing = float(plant.torque(angle, 3e5, 1.5e5)) - float(plant.weight_torque(angle, 0.0))
+    assert missing == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.fixture(scope="module", params=["none", "maxwell_slip", "maxwell_slip_length"])
+def cycles(request):
+    """Record two equal cycles of a joint with yielding friction and taut muscles.
+
+    Return the plant, pressures [Pa] and contractions, both (2, T), and by muscle the friction [N]
+    that is missing in its force: of a contraction, positive if it opposes growth.
+    """
+    smooth = {"muscle.viscosity": 0.0, "muscle.imbalance": 0.0}
+    plain = AntagonisticJoint.paper(request.param).with_lag_alone().replace(smooth)
+    plant = plain.replace(YIELDING)
+    corners = np.array([3.6, 5.5, 3.5, 4.5, 3.9, 5.3, 3.6]) * 1e5
+    share = 0.5 - 0.5 * np.cos(np.pi * np.arange(120) / 120)
+    cycle = (corners[:-1, None] + np.diff(corners)[:, None] * share).ravel()
+    pressures = np.tile(cycle, 2), np.full(2 * CYCLE, 4.5e5)
+    made = simulate_joint(plant, pressures=pressures, compiled=False)
+    assert not made["slack"].any()
+    pressure, strain, force = (
+        np.stack([made[f"{name}_{side}"] for side in "ab"])
+        for name in ("pressure", "contraction", "force")
+    )
+    friction = plant.muscle.gain * plant.muscle.law(pressure, strain) - force
+    return plant, pressure, strain, friction
+
+
+def friction_of_elements(plant, pressure, strain):
+    """Return the friction [N] without its yielding part, (2, T)."""
+    straight = float(plant.lever.contraction(0.0, plant.muscle.rest_length)[0])
+    states, made = [plant.hysteresis.model.initial_state((1,))] * 2, np.zeros(strain.shape)
+    for t in range(strain.shape[1]):
+        for m in range(2):
+            at = strain[m, [t]] - straight
+            drag, states[m] = plant.hysteresis.friction(at, pressure[m, [t]], states[m])
+            made[m, t] = drag[0]
+    return made
+
+
+def test_yielding_friction_of_each_muscle_follows_its_contraction(cycles):
+    plant, pressure, strain, friction = cycles
+    straight = float(plant.lever.contraction(0.0, plant.muscle.rest_length)[0])
+    law = plant.muscle
+    stiff, expected = law.yield_force / law.yield_break, np.zeros(strain.shape)
+    for m in range(2):
+        at, before = 0.0, straight
+        for t, (p, e) in enumerate(zip(pressure[m], strain[m], strict=True)):
+            most = (law.yield_force + law.yield_per_pressure * p) / stiff
+            at, before = deflected(at, e - before, most, law.yield_ratio)[0], e
+            expected[m, t] = stiff * at
+    found = friction - friction_of_elements(plant, pressure, strain)
+    assert np.abs(expected).max() > 7.0
+    assert found[:, BEGUN:] == pytest.approx(expected[:, BEGUN:], abs=0.05)
+
+
+def test_yielding_friction_turns_with_the_motion_and_reaches_its_limit(cycles):
+    plant, pressure, strain, friction = cycles
+    law = plant.muscle
+    found = friction - friction_of_elements(plant, pressure, strain)
+    limit = law.yield_force + law.yield_per_pressure * pressure
+    assert (np.abs(found) < 1.01 * limit)[:, BEGUN:].all()
+    for m in range(2):
+        turns = BEGUN + np.flatnonzero(np.diff(np.sign(np.diff(strain[m, BEGUN:])))) + 1
+        sides = set()
+        for first, last in pairwise(turns):
+            way = strain[m, last] - strain[m, first]
+            span = limit[m, first:last].max() / law.yield_force * law.yield_break
+            if abs(way) > 5.0 * span:
+                reached = np.sign(way) * found[m, first:last] / limit[m, first:last]
+                assert reached[0] < 0.0 and reached.max() > 0.95
+                sides.add(np.sign(way))
+        assert sides == {-1.0, 1.0}
+
+
+def test_yielding_friction_of_the_joint_creates_no_energy(cycles):
+    """Its power, without that which its spring stores, is never positive; closed cycles lose."""
+    plant, pressure, strain, friction = cycles
+    law = plant.muscle
+    found = friction - friction_of_elements(plant, pressure, strain)
+    stored = 0.5 * found**2 * law.yield_break / law.yield_force  # [N], an energy by rest length
+    moved = np.diff(strain, axis=1)
+    taken = 0.5 * (found[:, 1:] + found[:, :-1]) * moved
+    lost = taken - np.diff(stored, axis=1)
+    limit = law.yield_force + law.yield_per_pressure * pressure.max()
+    assert lost[:, BEGUN:].min() > -1e-3 * limit * law.yield_break
+    second = taken[:, CYCLE - 1 :].sum(axis=1)
+    assert np.abs(strain[:, CYCLE - 1] - strain[:, -1]).max() < 1e-4
+    assert (second > 0.3 * limit * np.abs(moved[:, CYCLE - 1 :]).sum(axis=1)).all()
