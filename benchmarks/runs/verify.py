@@ -77,8 +77,36 @@ def void(row: Record) -> list[str]:
     return changes + differences(about["artefact"]["knobs"], dict(made.knobs), "knobs")
 
 
-def verify(path: Path, cluster: engine.Cluster | None = None) -> Verdict:
-    """Compute the row of a file again, by default in this process, and compare."""
+@dataclass(frozen=True)
+class RowFile:
+    """File of a row, as a task of a sweep."""
+
+    path: Path
+
+    @property
+    def key(self) -> str:
+        """Path, by which tasks differ."""
+        return str(self.path)
+
+
+def verify_all(paths: Iterable[Path], cluster: engine.Cluster) -> Iterator[tuple[RowFile, Verdict]]:
+    """Compute rows again, each in one process, and yield their verdicts as they complete."""
+    tasks_by_key = {one.key: one for one in map(RowFile, paths)}
+    for done in engine.run(_verdict_of, tasks_by_key.values(), cluster):
+        file = tasks_by_key[done.key]
+        if done.error is None:
+            yield file, done.value
+        else:
+            reason = f"cannot be run again: {done.error}"
+            yield file, Verdict(rows.name_of(file.path), drifted=[reason])
+
+
+def _verdict_of(file: RowFile) -> Verdict:
+    return verify(file.path)
+
+
+def verify(path: Path) -> Verdict:
+    """Compute the row of a file again in this process, and compare."""
     verdict = Verdict(rows.name_of(path))
     try:
         stored = read_json(path)
@@ -91,7 +119,7 @@ def verify(path: Path, cluster: engine.Cluster | None = None) -> Verdict:
     if wrong:
         verdict.drifted.append(f"file: {wrong}")
     try:
-        _check(stored, cluster or engine.Cluster(), verdict)
+        _check(stored, verdict)
     except KeyError as error:
         verdict.drifted.append(f"cannot be run again: there is no {error}")
     except Exception as error:
@@ -103,7 +131,7 @@ def _track(row: Record) -> ScenarioSet:
     return scenarios.load(scenarios.FOLDER / f"{row['scenarios']['name']}.yaml")
 
 
-def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
+def _check(stored: Record, verdict: Verdict) -> None:
     tasks.check_version(stored["env"]["id"], stored["row"])
     entrant, track = find(stored["controller"]["name"]), _track(stored)
     content = (stored["scenarios"]["content"], track.content)
@@ -118,10 +146,8 @@ def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
     verdict.drifted += _other_audit(stored, entrant, track, plan.found)
     verdict.drifted += _other_episodes(stored, plan.cells.values())
     records: dict[str, Any] = {}
-    for done in engine.run(cells.compute, cells.grouped(plan.cells.values()), cluster):
-        if done.error is not None:
-            raise ValueError(done.error)
-        records |= done.value
+    for group in cells.grouped(plan.cells.values()):
+        records |= cells.compute(group)
     made = rows.assemble(entrant, track, [records[key] for key in plan.cells], plan.found)
     _compare(stored, plain(made), verdict)
 
