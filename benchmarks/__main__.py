@@ -241,9 +241,9 @@ def verify(
     if altered := auditing.altered():
         raise ValueError("; ".join(altered))
     verdicts = []
-    for file, found in checking.verify_all(_row_paths(row, all), options.cluster):
-        if file.path.resolve().parents[1] == rows.RESULTS.resolve():
-            verified.note(file.path, found.checksum if found.holds else "", found.mode)
+    for path, found in checking.verify_all(_row_paths(row, all), options.cluster):
+        if path.resolve().parents[1] == rows.RESULTS.resolve():
+            verified.note(path, found.checksum if found.holds else "", found.mode)
         console.verdict(found)
         verdicts.append(found)
     if len(verdicts) > 1:

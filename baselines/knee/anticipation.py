@@ -15,9 +15,9 @@ sensed.
 A planned sample is in stance where it differs from the tension of zero torque at the planned angle.
 In swing both are equal but for a constant offset, which is observed there.
 
-The torque of a gait's plan is that of the wearer but for a difference, which is sensed, goes on at
-its present rate for a while, and fades. The tension that gives it depends on the angle, which is
-the plan's, moved by the deviation of the wearer's knee under the assistance
+The torque of a gait's plan is that of the wearer but for a difference, which is sensed, continues
+at its present rate for a short time, and fades. The tension that gives it depends on the angle,
+which is the plan's, moved by the deviation of the wearer's knee under the assistance
 (:mod:`baselines.knee.wearer`) and by a filtered difference.
 
 The adaptive form also estimates the regulator, as the best of a bank of models, and the gain of the
@@ -439,7 +439,7 @@ class KneeAnticipation(RowController):
     ) -> Array:
         """Return the distances [N m] of the torque from the plan at the nodes.
 
-        They go on at the present rate for a while: the reference is low-passed.
+        They continue at the present rate for a short time, since the reference is low-passed.
         """
         assert self.torque is not None
         lever, sensed = self.observer.nominal.plant.lever, self.torque.rows(observation)[0]
@@ -459,8 +459,8 @@ class KneeAnticipation(RowController):
             return demand.value
         nominal = self.observer.nominal
         tension = nominal.plant.lever.tension(demand.value, angle) + demand.correction
-        wanted = np.where(demand.stance, np.maximum(tension, 0.0), nominal.free_tension(angle))
-        return np.asarray(wanted / nominal.stretch(angle))
+        demanded = np.where(demand.stance, np.maximum(tension, 0.0), nominal.free_tension(angle))
+        return np.asarray(demanded / nominal.stretch(angle))
 
     def _weight(self, demand: Demand, angle: Array) -> Array:
         """Return the weights of squared errors of the pressure at the nodes."""

@@ -1,4 +1,4 @@
-"""Best rate-limited path of the pressure where it pushes the knee.
+"""Best rate-limited path of the pressure, with the deviation of the knee that it causes.
 
 The best path of :mod:`baselines.predictive.rate_limited` takes the angle as given. On a leg the
 brace pushes the knee off the wearer's path, and the stretch of the muscle, hence its tension, is
@@ -27,7 +27,7 @@ from pam_envs.arrays import Array
 from pam_envs.kernels.build import entry, kernel
 
 ITERATIONS = 20
-"""Gradient steps a control period; the next one goes on from their result."""
+"""Gradient steps per control period; the next period starts from their result."""
 
 
 class Push(NamedTuple):

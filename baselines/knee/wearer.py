@@ -11,8 +11,9 @@ with the load on the leg. In stance the deviation is a few hundredths of a radia
 60 ms, about the dead time of the regulator: a prediction that keeps it constant is late by most of
 a control period.
 
-The nominal leg is integrated along the sensed load and the torques of the nominal brace. What then
-remains of the sensed angle is attributed to the path.
+The nominal leg is integrated along the torques of the nominal brace and the load, which is sensed
+at present and that of the nominal stride over the horizon. What then remains of the sensed angle is
+attributed to the path.
 """
 
 from dataclasses import dataclass

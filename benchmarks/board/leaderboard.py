@@ -106,7 +106,8 @@ def times_text(all_rows: Sequence[Row]) -> str:
         "",
         "Time of one call of `predict` for one observation, Python included, as stated by the",
         "author of the row, not verified. Median and 99th percentile of the first 50 actions",
-        "in an episode of each scenario. Machines and their load differ.",
+        "in an episode of each scenario, or of all actions where the episodes run one by one.",
+        "Machines and their load differ.",
         "",
     ]
     columns: Cells = {

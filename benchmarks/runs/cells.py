@@ -1,7 +1,7 @@
 """Cells of the checkpoint: one controller in one scenario, over its public or its audit seeds.
 
-The cells of one policy in one track form a group, whose episodes are the rows of one batch wherever
-the controllers of its scenarios are the same one. The record of a cell does not depend on its
+The cells of one policy in one track form a group. The episodes of scenarios that share a controller
+are the rows of one batch. The record of a cell does not depend on its
 group.
 """
 
@@ -32,8 +32,8 @@ from benchmarks.scoring.metrics import scores_of
 SCHEMA = 3
 PUBLIC, AUDIT = "public", "audit"
 INFORMED_SEEDS = {PUBLIC: 1, AUDIT: 3}
-"""Seeds a scenario of a controller that is designed from the plant of each episode."""
-DIGITS = 9  # significant digits of a stored score; the trajectory's digest has all bits
+"""Seeds per scenario of a controller that is designed from the plant of each episode."""
+DIGITS = 9  # significant digits of a stored score; the digest of a trajectory uses all bits
 PROBED_STEPS = 250  # number of steps of the episode that measures the use of the preview
 
 
@@ -142,7 +142,7 @@ class Scene:
 
     @property
     def design(self) -> tuple[Any, ...]:
-        """What a controller is designed from."""
+        """Inputs of the design of a controller."""
         base = self.env.unwrapped
         return self.model.digest(), base.signals, base.action_signals
 

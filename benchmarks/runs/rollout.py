@@ -186,7 +186,8 @@ def _run_rows(
 ) -> list[list[Episode]]:
     """Step until every row has ended once; return the first episode of each, without times.
 
-    The batches are rows of one controller. One whose rows have all ended waits at a start.
+    The batches are rows of one controller. A batch whose rows have all ended is no longer stepped;
+    its rows are at the start of an episode.
     """
     runs = [_BatchRun(*of_part) for of_part in zip(batches, seeds, strict=True)]
     model_output = getattr(controller, "model_output", None)

@@ -8,6 +8,7 @@ have been rewritten since with actions that are equal within 1e-6.
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -77,61 +78,94 @@ def void(row: Record) -> list[str]:
     return changes + differences(about["artefact"]["knobs"], dict(made.knobs), "knobs")
 
 
-@dataclass(frozen=True)
-class RowFile:
-    """File of a row, as a task of a sweep."""
-
-    path: Path
-
-    @property
-    def key(self) -> str:
-        """Path, by which tasks differ."""
-        return str(self.path)
-
-
-def verify_all(paths: Iterable[Path], cluster: engine.Cluster) -> Iterator[tuple[RowFile, Verdict]]:
-    """Compute rows again, each in one process, and yield their verdicts as they complete."""
-    tasks_by_key = {one.key: one for one in map(RowFile, paths)}
-    for done in engine.run(_verdict_of, tasks_by_key.values(), cluster):
-        file = tasks_by_key[done.key]
-        if done.error is None:
-            yield file, done.value
-        else:
-            reason = f"cannot be run again: {done.error}"
-            yield file, Verdict(rows.name_of(file.path), drifted=[reason])
-
-
-def _verdict_of(file: RowFile) -> Verdict:
-    return verify(file.path)
-
-
 def verify(path: Path) -> Verdict:
     """Compute the row of a file again in this process, and compare."""
+    ((_, verdict),) = verify_all([path], engine.Cluster())
+    return verdict
+
+
+def verify_all(paths: Iterable[Path], cluster: engine.Cluster) -> Iterator[tuple[Path, Verdict]]:
+    """Compute the rows of files again and yield their verdicts as they complete."""
+    groups, asked = list[cells.Group](), dict[str, _Check]()
+    for path in paths:
+        check = _opened(path)
+        if check.plan is None:
+            yield path, check.verdict
+            continue
+        for group in cells.grouped(check.plan.cells.values()):
+            groups.append(group)
+            asked[group.key] = check
+            check.left.add(group.key)
+    for done in engine.run(cells.compute, groups, cluster):
+        check = asked[done.key]
+        check.left.discard(done.key)
+        if done.error is None:
+            check.records |= done.value
+        else:
+            check.verdict.drifted.append(f"cannot be run again: {done.error}")
+        if not check.left:
+            check.finish()
+            yield check.path, check.verdict
+
+
+@dataclass
+class _Check:
+    """Row of a file, while it is computed again."""
+
+    path: Path
+    verdict: Verdict
+    stored: Record = field(default_factory=dict)
+    plan: runner.Plan | None = None  # missing if the row cannot be computed again
+    left: set[str] = field(default_factory=set)  # groups that are not computed yet
+    records: dict[str, Any] = field(default_factory=dict)
+
+    def finish(self) -> None:
+        """Compare the row with what was computed, if all of it was."""
+        plan, verdict = self.plan, self.verdict
+        if plan is None or not plan.cells.keys() <= self.records.keys():
+            return
+        with _drift(verdict):
+            records = [self.records[key] for key in plan.cells]
+            made = rows.assemble(plan.entrant, plan.track, records, plan.found)
+            _compare(self.stored, plain(made), verdict)
+
+
+def _opened(path: Path) -> _Check:
+    """Return the check of a file, with what is found before anything is computed."""
     verdict = Verdict(rows.name_of(path))
     try:
         stored = read_json(path)
         rows.check_schema(stored, path)
     except (OSError, ValueError, AttributeError, TypeError) as error:
         verdict.drifted.append(f"the file cannot be read: {error}")
-        return verdict
+        return _Check(path, verdict)
     verdict.checksum = str(stored.get(CHECKSUM))
     wrong = fault(stored)
     if wrong:
         verdict.drifted.append(f"file: {wrong}")
+    check = _Check(path, verdict, stored)
+    with _drift(verdict):
+        check.plan = _plan(stored, verdict)
+    return check
+
+
+@contextmanager
+def _drift(verdict: Verdict) -> Iterator[None]:
+    """Note an error as drift."""
     try:
-        _check(stored, verdict)
+        yield
     except KeyError as error:
         verdict.drifted.append(f"cannot be run again: there is no {error}")
     except Exception as error:
         verdict.drifted.append(f"cannot be run again: {type(error).__name__}: {error}")
-    return verdict
 
 
 def _track(row: Record) -> ScenarioSet:
     return scenarios.load(scenarios.FOLDER / f"{row['scenarios']['name']}.yaml")
 
 
-def _check(stored: Record, verdict: Verdict) -> None:
+def _plan(stored: Record, verdict: Verdict) -> runner.Plan | None:
+    """Return what has to be computed again, if the row is of the present scenarios."""
     tasks.check_version(stored["env"]["id"], stored["row"])
     entrant, track = find(stored["controller"]["name"]), _track(stored)
     content = (stored["scenarios"]["content"], track.content)
@@ -141,15 +175,11 @@ def _check(stored: Record, verdict: Verdict) -> None:
             f"scenarios: the content is not that of {track.name}.yaml, version "
             f"{track.content['version']}; run the row again"
         )
-        return
+        return None
     (plan,) = runner.plans([(entrant, track)])
     verdict.drifted += _other_audit(stored, entrant, track, plan.found)
     verdict.drifted += _other_episodes(stored, plan.cells.values())
-    records: dict[str, Any] = {}
-    for group in cells.grouped(plan.cells.values()):
-        records |= cells.compute(group)
-    made = rows.assemble(entrant, track, [records[key] for key in plan.cells], plan.found)
-    _compare(stored, plain(made), verdict)
+    return plan
 
 
 def _other_audit(

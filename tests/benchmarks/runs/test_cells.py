@@ -3,6 +3,7 @@
 import dataclasses
 import shutil
 
+import numpy as np
 import pytest
 
 from benchmarks.identity import audit
@@ -99,14 +100,25 @@ def test_scenarios_of_one_controller_are_rows_of_one_batch(monkeypatch):
     assert sum(map(len, sizes)) == len(names)
 
 
+def test_stored_scores_have_nine_digits():
+    track = scenarios.available()["joint_nominal"]
+    first = cells.cells_of(find("joint_pid"), track)[0]
+    (record,) = cells.compute(cells.Group((first,))).values()
+    for episode in record["episodes"]:
+        for value in episode["scores"].values():
+            assert np.isnan(value) or value == float(f"{value:.9g}")
+
+
 def test_informed_controller_has_the_first_seeds_and_a_group_for_each_scenario():
     track = scenarios.available()["joint_randomised"]
     entrant = find("joint_inverse_ahead_informed")
-    salt = audit.find(find("joint_inverse_ahead"), track)
-    made = cells.cells_of(entrant, track, salt)
+    found = audit.find(find("joint_inverse_ahead"), track)
+    assert found is not None
+    made = cells.cells_of(entrant, track, found)
+    assert {cell.split for cell in made} == {cells.PUBLIC, cells.AUDIT}
     for cell in made:
-        whole = track.seeds if cell.split == cells.PUBLIC else salt.seeds
-        assert cell.seeds == whole[cell.scenario.name][: cells.INFORMED_SEEDS[cell.split]]
+        whole = (track.seeds if cell.split == cells.PUBLIC else found.seeds)[cell.scenario.name]
+        assert cell.seeds == whole[: cells.INFORMED_SEEDS[cell.split]] != whole
     assert len(cells.grouped(made)) == len(track.scenarios())
 
 

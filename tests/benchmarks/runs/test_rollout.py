@@ -176,6 +176,15 @@ def test_controller_whose_rows_depend_on_each_other_is_run_alone(controller, bat
     assert controller.batches == batches
 
 
+class Counting(Rows):
+    """A controller whose action depends on the step of the episode of each row."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        action, step = super().predict(observation, state, episode_start, deterministic)
+        turn = np.cos(0.3 * step).astype(np.float32)
+        return action * (turn[:, None] if np.ndim(observation) == 2 else turn), step
+
+
 def test_parts_of_a_batch_end_independently():
     env_id = "PAM/MusclePositioning-v0"
     steps = {**SHORT, "reference": "steps"}
@@ -184,7 +193,7 @@ def test_parts_of_a_batch_end_independently():
         part_of(env_id, {**steps, "episode_seconds": 3.0}, (2,)),
         part_of(env_id, {**steps, "randomize": True}, (4, 4)),
     ]
-    controller = Rows()
+    controller = Counting()
     first, second, third = compared_parts(parts, controller)
     lengths = [{len(episode.actions) for episode in own} for own in (first, second, third)]
     assert lengths == [{20}, {300}, {20}]
@@ -193,14 +202,23 @@ def test_parts_of_a_batch_end_independently():
     assert all(np.array_equal(second[0].signals[name], signals[name]) for name in signals)
 
 
-def test_one_part_whose_rows_are_not_its_own_is_found():
-    """The mean over all rows differs from a row in the second part alone."""
+class Beside(Rows):
+    """A controller whose second row depends on the first one."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        action, step = super().predict(observation, state, episode_start, deterministic)
+        if np.ndim(observation) == 2 and len(observation) > 1:
+            action[1] = action[0]
+        return action, step
+
+
+def test_part_in_the_middle_whose_rows_are_not_its_own_is_found():
     env_id = "PAM/MusclePositioning-v0"
-    parts = [part_of(env_id, SHORT, (seed,)) for seed in (5, 2)]
-    controller = Rows(mixed=1.0)
+    parts = [part_of(env_id, SHORT, (seed,)) for seed in (5, 2, 9)]
+    controller = Beside()
     together = [*chain(*compared_parts(parts, controller))]
     assert controller.batches == 20
-    assert [len(episode.actions) for episode in together] == [20, 20]
+    assert [len(episode.actions) for episode in together] == [20, 20, 20]
 
 
 def test_rows_of_a_batch_end_independently():

@@ -13,11 +13,12 @@ import pytest
 
 from benchmarks.__main__ import main
 from benchmarks.identity import audit
-from benchmarks.runs import provenance, rows, traces, verified, verify
+from benchmarks.runs import cells, provenance, rows, traces, verified, verify
 from benchmarks.runs.store import read_json, read_record, write_json, write_record
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import metrics
 from pam_envs.envs.positioning import env as muscle_positioning
+from sweeps import engine
 from tests.benchmarks.row_helpers import draw, place, run_row
 
 Row = dict[str, Any]
@@ -43,6 +44,23 @@ def path_of(board: Path, name: str) -> Path:
 
 def verdict_of(board: Path, name: str) -> verify.Verdict:
     return verify.verify(path_of(board, name))
+
+
+def test_rows_are_verified_side_by_side(board, tmp_path):
+    paths = [path_of(board, name) for name in ("tuned", "integral", "trained")]
+    missing = tmp_path / "tiny--none.json"
+    found = dict(verify.verify_all([*paths, missing], engine.Cluster(1)))
+    assert [*found] == [missing, *paths]
+    assert [found[path].holds for path in paths] == [True] * 3
+    assert_drifted(found[missing], "cannot be read")
+
+
+def test_row_whose_cells_fail_is_not_reproduced(board, monkeypatch):
+    def fails(group):
+        raise RuntimeError("no room")
+
+    monkeypatch.setattr(cells, "compute", fails)
+    assert_drifted(verdict_of(board, "tuned"), "cannot be run again: RuntimeError: no room")
 
 
 @pytest.fixture
