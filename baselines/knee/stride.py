@@ -83,7 +83,7 @@ class NominalStride:
         return np.stack([tension, angle, load, stance])
 
     def phase(self, seen: Array, ahead: NDArray[np.int64], sought: Rows, before: Array) -> Array:
-        """Return the point of the stride at present, shape (n_env,).
+        """Return the point of the stride at present [control periods], shape (n_env,).
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class NominalStride:
         sought : ndarray of bool, shape (n_env,)
             Whether a point is sought.
         before : ndarray, shape (n_env,)
-            Points of the others.
+            Points of the others [control periods].
         """
         at = np.arange(self.samples.shape[1])[:, None] + ahead
         scale = np.array([TENSION_MISFIT, ANGLE_MISFIT])
