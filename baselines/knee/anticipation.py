@@ -224,7 +224,7 @@ class KneeAnticipation(RowController):
         start = arrival.pressures[-1]
         if self.observer.gait:
             slope = self.observer.nominal.per_stiffness * now.moments[:, :1] / now.moments[:, 1:]
-            push = self._push(now, ends, demand, angle, slope)
+            push = self._push(now, ends, demand, angle, stiffness, slope)
             best, off = pushed_path(start, path, weight, reach, push, response)
             reached, angle = stiffness + (best - path) / slope, angle + _near(off)
             most = self.observer.nominal.full_pressure / self.observer.nominal.per_stiffness
@@ -248,17 +248,17 @@ class KneeAnticipation(RowController):
         return self.observer.nominal.plant.lever.torque(tension, angle)
 
     def _push(
-        self, now: AnticipationState, ends: Array, demand: Demand, angle: Array, slope: Array
-    ) -> Push:
+        self, now: AnticipationState, ends: Array, demand: Demand, angle: Array, stiffness: Array,
+        slope: Array,
+    ) -> Push:  # fmt: skip
         """Return the linear model of the pushed knee at predicted angles [rad].
 
-        ``slope`` is the pressure over the stiffness [Pa m/N].
+        ``stiffness`` is that demanded there [N/m], ``slope`` the pressure over the stiffness
+        [Pa m/N].
         """
         nominal, lever = self.observer.nominal, self.observer.nominal.plant.lever
-        pairs = zip(ends, now.torque, strict=True)
-        before = np.stack([np.interp(times, times - 1.0, torque) for times, torque in pairs])
+        before = _planned_torque(now, ends, ends)
         less, more, wide = angle - BESIDE, angle + BESIDE, 2.0 * BESIDE
-        stiffness = self._stiffness(demand, angle)
         change = self._stiffness(demand, more) - self._stiffness(demand, less)
         return Push(
             excess=self._torque(stiffness, angle) - before,
@@ -356,7 +356,7 @@ class KneeAnticipation(RowController):
         here = now.wearer[:, [0, 2]].sum(axis=1)[:, None]
         path, stance = samples[:, 1], self._in_stance(samples[:, 0], samples[:, 1], now)
         halves = np.arange(last) + 0.5
-        torque = np.stack([np.interp(halves, ends[i] - 1.0, now.torque[i]) for i in range(n)])
+        torque = _planned_torque(now, ends, np.tile(halves, (n, 1)))
         middle = 0.5 * (path[:, 1:-2] + path[:, 2:-1]) + here
         hysteresis, gain = now.hysteresis, now.moments[:, 1] / now.moments[:, 0]
         for k, pressure in enumerate(arrival.pressures):
@@ -532,6 +532,12 @@ class KneeAnticipation(RowController):
         """Return where planned samples are in stance, shape (n_env, n_times)."""
         free = self.observer.nominal.free_tension(angle)
         return np.asarray(np.abs(tension - free - now.offset[:, None]) > SMALLEST)
+
+
+def _planned_torque(now: AnticipationState, ends: Array, times: Array) -> Array:
+    """Return the torques [N m] planned in the last period at times, (n_env, n_times)."""
+    rows = zip(times, ends - 1.0, now.torque, strict=True)
+    return np.stack([np.interp(at, nodes, torque) for at, nodes, torque in rows])
 
 
 def _near(deviation: Array) -> Array:

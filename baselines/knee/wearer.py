@@ -18,12 +18,13 @@ attributed to the path.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
-from pam_envs.kernels.build import entry
+from pam_envs.kernels.build import entry, kernel
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 SUBSTEPS = 2
@@ -110,6 +111,20 @@ class WearerModel:
         return found
 
 
+@kernel
+def deviated(
+    off: float, rate: float, torque: float, load: float, hold: Any, step: float
+) -> tuple[float, float]:
+    """Return the deviation [rad] and its rate [rad/s] one control period later."""
+    stiffness = hold[0] + hold[2] * load
+    damping = hold[1] + hold[3] * load
+    for _ in range(SUBSTEPS):
+        push = (-torque - stiffness * off) * hold[4]
+        rate = (rate + step * push) / (1.0 + step * damping * hold[4])
+        off = off + step * rate
+    return off, rate
+
+
 @entry
 def deviate_rows(
     start: Array, torque: Array, load: Array, hold: Array, step: float, found: Array
@@ -118,12 +133,7 @@ def deviate_rows(
     for i in range(len(start)):
         off, rate = start[i, 0], start[i, 1]
         for k in range(torque.shape[1]):
-            stiffness = hold[0] + hold[2] * load[i, k]
-            damping = hold[1] + hold[3] * load[i, k]
-            for _ in range(SUBSTEPS):
-                push = (-torque[i, k] - stiffness * off) * hold[4]
-                rate = (rate + step * push) / (1.0 + step * damping * hold[4])
-                off = off + step * rate
+            off, rate = deviated(off, rate, torque[i, k], load[i, k], hold, step)
             found[i, k, 0], found[i, k, 1] = off, rate
 
 
@@ -153,12 +163,7 @@ def respond_rows(
                     elif time < ends[i, j + 1]:
                         torque = (ends[i, j + 1] - time) / (ends[i, j + 1] - ends[i, j])
                 before = off * scale[i, m]
-                stiffness = hold[0] + hold[2] * load[i, m]
-                damping = hold[1] + hold[3] * load[i, m]
-                for _ in range(SUBSTEPS):
-                    push = (-torque - stiffness * off) * hold[4]
-                    rate = (rate + step * push) / (1.0 + step * damping * hold[4])
-                    off = off + step * rate
+                off, rate = deviated(off, rate, torque, load[i, m], hold, step)
                 after = off * scale[i, m + 1]
                 while k < nodes and ends[i, k] <= m + 1:
                     part = ends[i, k] - m

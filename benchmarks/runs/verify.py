@@ -6,7 +6,7 @@ states others may differ by rounding, and is recorded as verified within toleran
 have been rewritten since with actions that are equal within 1e-6.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -86,7 +86,7 @@ def verify(path: Path) -> Verdict:
 
 def verify_all(paths: Iterable[Path], cluster: engine.Cluster) -> Iterator[tuple[Path, Verdict]]:
     """Compute the rows of files again and yield their verdicts as they complete."""
-    groups, asked = list[cells.Group](), dict[str, _Check]()
+    groups, asked = list[cells.Group](), defaultdict[str, list[_Check]](list)
     for path in paths:
         check = _opened(path)
         if check.plan is None:
@@ -94,18 +94,18 @@ def verify_all(paths: Iterable[Path], cluster: engine.Cluster) -> Iterator[tuple
             continue
         for group in cells.grouped(check.plan.cells.values()):
             groups.append(group)
-            asked[group.key] = check
+            asked[group.key].append(check)  # two files may hold one row
             check.left.add(group.key)
     for done in engine.run(cells.compute, groups, cluster):
-        check = asked[done.key]
-        check.left.discard(done.key)
-        if done.error is None:
-            check.records |= done.value
-        else:
-            check.verdict.drifted.append(f"cannot be run again: {done.error}")
-        if not check.left:
-            check.finish()
-            yield check.path, check.verdict
+        for check in asked[done.key]:
+            check.left.discard(done.key)
+            if done.error is None:
+                check.records |= done.value
+            else:
+                check.verdict.drifted.append(f"cannot be run again: {done.error}")
+            if not check.left:
+                check.finish()
+                yield check.path, check.verdict
 
 
 @dataclass

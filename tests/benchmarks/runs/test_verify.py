@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,17 @@ def test_rows_are_verified_side_by_side(board, tmp_path):
     assert [*found] == [missing, *paths]
     assert [found[path].holds for path in paths] == [True] * 3
     assert_drifted(found[missing], "cannot be read")
+
+
+def test_each_file_of_a_row_has_a_verdict(board, tmp_path):
+    path = path_of(board, "tuned")
+    copied = tmp_path / path.parent.name / path.name
+    copied.parent.mkdir()
+    shutil.copy(path, copied)
+    paths = [path, copied, path]
+    found = [*verify.verify_all(paths, engine.Cluster())]
+    assert [other for other, _ in found] == paths
+    assert all(verdict.holds for _, verdict in found)
 
 
 def test_row_whose_cells_fail_is_not_reproduced(board, monkeypatch):
