@@ -15,8 +15,8 @@ sensed.
 A planned sample is in stance where it differs from the tension of zero torque at the planned angle.
 In swing both are equal but for a constant offset, which is observed there.
 
-The torque of a gait's plan is that of the wearer but for a difference, which is sensed, continues
-at its present rate for a short time, and fades. The tension that gives it depends on the angle,
+The torque of a gait's plan is that of the wearer but for a difference, which is predicted from the
+sensed ones (:mod:`baselines.knee.torque_ahead`). The tension that gives it depends on the angle,
 which is the plan's, moved by the deviation of the wearer's knee under the assistance
 (:mod:`baselines.knee.wearer`) and by a filtered difference.
 
@@ -49,6 +49,7 @@ from baselines.knee.nominal import KneeObserver, KneeView, make_knee_observer
 from baselines.knee.plan import SCALES, PhaseFilter, Plan
 from baselines.knee.pushed_path import Push, pushed_path
 from baselines.knee.stride import NominalStride
+from baselines.knee.torque_ahead import PAST, TorqueAhead
 from baselines.knee.wearer import WearerModel
 from baselines.predictive.preview import PreviewMemory
 from baselines.predictive.rate_limited import best_path
@@ -66,14 +67,14 @@ BLOCKS = (1,) * 8 + (2,) * 6 + (4,) * 10
 """Control periods between the nodes of the horizon: 0.6 s."""
 ANGLE_NOISE = 0.005
 """Difference [rad] of the path from the plan."""
+STANCE_NOISE = 0.02
+"""Difference [rad] of the angle in stance, less the deviation, from the plan."""
 TORQUE_NOISE = 0.4
 """Difference [N m] of the torque in stance from the plan."""
 USUAL_STRETCH = 0.05
 """Stretch [m] whose errors of the tension have the weight 1."""
 KEPT = 300.0
-"""Time constant [periods] for which the torque keeps its distance from the plan."""
-LASTING = 6.0
-"""Time constant [periods] for which that distance keeps its rate."""
+"""Time constant [periods] for which the plan keeps its distance from the nominal stride."""
 FILTERED = 0.5
 """Share of a difference of the angle that is attributed to the path in a period."""
 YIELDING = np.array([0.001, 0.03])
@@ -86,6 +87,8 @@ SPREAD = 0.5**0.5
 """Standard deviation of a stride's beginning over that of durations."""
 EARLY = 0.5
 """Time [periods] before the first sample of a stance from which a node counts as in stance."""
+LATE = 3.0
+"""Time [periods] after the last sample of a stance up to which a node counts as in stance."""
 FARTHEST = 0.3
 """Largest predicted deviation of the knee [rad]; about the largest that an episode may have."""
 BESIDE = 0.01
@@ -129,8 +132,8 @@ class AnticipationState(NamedTuple):
     (n_env, 2, 2), in swing and in stance, are the sums of squares of the deviation, and of its
     product with the sensed one [rad2]. ``torque``, shape (n_env, n_nodes), are the torques of the
     brace [N m] that were planned in the last period, and ``place``, shape (n_env,), is the present
-    in the nominal stride [control periods]. ``before``, shape (n_env, 2), are the torque reference
-    [N m] of the last period and whether it was in stance [0 or 1].
+    in the nominal stride [control periods]. ``past``, shape (n_env, n_past), are the last torque
+    references [N m], the newest first.
     """
 
     bank: BankState
@@ -142,7 +145,7 @@ class AnticipationState(NamedTuple):
     yielding: Array
     torque: Array
     place: Array
-    before: Array
+    past: Array
 
 
 @dataclass(frozen=True)
@@ -192,7 +195,7 @@ class KneeAnticipation(RowController):
             np.tile(YIELDING[:, None], (len(view.set_point), 1, 2)),
             np.zeros((len(view.set_point), len(ENDS))),
             np.zeros(len(view.set_point)),
-            np.zeros((len(view.set_point), 2)),
+            np.zeros((len(view.set_point), PAST)),
         )
 
     def respond(self, observation: ArrayLike, state: AnticipationState) -> Prediction:
@@ -225,22 +228,17 @@ class KneeAnticipation(RowController):
         if self.observer.gait:
             slope = self.observer.nominal.per_stiffness * now.moments[:, :1] / now.moments[:, 1:]
             push = self._push(now, ends, demand, angle, stiffness, slope)
-            best, off = pushed_path(start, path, weight, reach, push, response)
+            full = self.observer.nominal.full_pressure
+            best, off = pushed_path(start, path, weight, reach, push, response, full)
             reached, angle = stiffness + (best - path) / slope, angle + _near(off)
-            most = self.observer.nominal.full_pressure / self.observer.nominal.per_stiffness
-            torque = self._torque(np.clip(reached, 0.0, most), angle)
-            now = now._replace(torque=torque, before=self._before(view, observation))
+            torque = self._torque(np.clip(reached, 0.0, full / slope), angle)
+            now = now._replace(torque=torque)
         else:
             best = best_path(start, path, weight, reach)
         command = arrival.set_point(best[:, 0], self.bank.period)
         command = np.minimum(np.maximum(command, signal.low), signal.high)
         after = now._replace(bank=self.bank.advance(now.bank, command))
         return encode_action(signal, command, observation), after
-
-    def _before(self, view: KneeView, observation: ArrayLike) -> Array:
-        """Return what the next period needs of this one: torque reference [N m], and stance."""
-        assert self.torque is not None
-        return np.stack([self.torque.rows(observation)[0], view.stance], axis=1)
 
     def _torque(self, stiffness: Array, angle: Array) -> Array:
         """Return the torques [N m] of a muscle of stiffnesses [N/m] at angles [rad]."""
@@ -300,8 +298,10 @@ class KneeAnticipation(RowController):
         now = state._replace(
             bank=bank, hysteresis=hysteresis, plan=plan, moments=moments, place=place
         )
-        if not self.observer.gait:
+        if self.torque is None:
             return now
+        torque = self.torque.rows(observation)[0][:, None]
+        now = now._replace(past=np.concatenate([torque, now.past[:, :-1]], axis=1))
         plan = self.phase.follow(plan, partial(self._likelihood, view, observation, now))
         now = self._pushed(view, observation, now._replace(plan=plan))
         free = nominal.free_tension(view.angle)
@@ -363,7 +363,7 @@ class KneeAnticipation(RowController):
             stiffness, hysteresis = nominal.forward(pressure, hysteresis)
             tension = gain * np.maximum(stiffness, 0.0) * nominal.stretch(middle[:, k])
             given = lever.torque(tension, middle[:, k])
-            torque[:, k] = np.where(k < arrival.delay, given, torque[:, k])
+            torque[:, k] = np.where(k + 0.5 < arrival.delay, given, torque[:, k])
         torque = torque + self._leg.passive(path)[:, :last]
         load = self._loads_ahead(observation, now, np.arange(last) + 0.5)
         course = self._leg.along(now.wearer[:, :2], torque, load)[..., 0]
@@ -403,7 +403,10 @@ class KneeAnticipation(RowController):
         given = self.torque.rows(observation)[0][:, None, None]
         off = (given - SCALES[:, None] * torque[:, None]) / TORQUE_NOISE
         path = ((view.angle_reference[:, None] - angle) / ANGLE_NOISE)[:, None]
-        fit = np.exp(-0.5 * np.where(stance[..., None], off, path) ** 2)
+        ratio = now.yielding[:, 1, 1] / now.yielding[:, 1, 0]
+        held = (view.angle - ratio * now.wearer[:, 0])[:, None] - angle
+        held = (held / STANCE_NOISE)[:, None]
+        fit = np.exp(-0.5 * np.where(stance[..., None], off**2 + held**2, path**2))
         sure = np.where(stance, MISMATCH, MISMATCH * fit[:, 0])[:, None]
         slack = self.observer.nominal.free_tension(angle) <= SMALLEST
         return np.where(((planned | (stance & slack)) == stance)[:, None], fit, sure)
@@ -426,7 +429,10 @@ class KneeAnticipation(RowController):
         soon = self._wholly_in_stance(plan, ends + EARLY, now) & ~stance
         samples = np.where(soon[:, None], self._ahead(now, ends + EARLY)[0], samples)
         torque = lever.torque(samples[:, 0], samples[:, 1])
-        torque = torque + self._excess_ahead(view, observation, now, ends)
+        late = self._wholly_in_stance(plan, ends - LATE, now) & view.stance[:, None] & ~stance
+        torque = np.where(late, self.stride.torque(place + ends), torque)
+        stance |= late
+        torque = torque + self._excess_ahead(now, ends)
         slack = (nominal.free_tension(samples[:, 1]) <= SMALLEST) & (samples[:, 0] <= SMALLEST)
         stance = stance | soon | (slack & self.stride.in_stance(place + ends))
         correction = np.zeros_like(ends)
@@ -434,24 +440,26 @@ class KneeAnticipation(RowController):
             correction = more(self.phase.present(plan)[:, None] + ends)
         return Demand(stance, torque, correction, weight)
 
-    def _excess_ahead(
-        self, view: KneeView, observation: ArrayLike, now: AnticipationState, ends: Array
-    ) -> Array:
+    def _excess_ahead(self, now: AnticipationState, ends: Array) -> Array:
         """Return the distances [N m] of the torque from the plan at the nodes.
 
-        They continue at the present rate for a short time, since the reference is low-passed.
+        The plan has no torque in swing, where it is that of the nominal stride.
         """
-        assert self.torque is not None
-        lever, sensed = self.observer.nominal.plant.lever, self.torque.rows(observation)[0]
-        planned, _ = self.phase.read(now.plan, np.tile([-1.0, 0.0], (len(ends), 1)))
-        loaded = self._in_stance(planned[:, 0], planned[:, 1], now)
-        torque = lever.torque(planned[:, 0], planned[:, 1])
-        together = view.stance & loaded[:, 1]
-        excess = np.where(together, sensed - torque[:, 1], 0.0)
-        both = together & loaded[:, 0] & (now.before[:, 1] > 0.0)
-        rate = np.where(both, excess - (now.before[:, 0] - torque[:, 0]), 0.0)
-        gone = LASTING * -np.expm1(-ends / LASTING)
-        return np.asarray(excess[:, None] * np.exp(-ends / KEPT) + rate[:, None] * gone)
+        assert self.stride is not None
+        plan, back = now.plan, np.arange(PAST)
+        times = np.tile(-back.astype(float), (len(ends), 1))
+        samples, known = self.phase.read(plan, times)
+        planned = self.observer.nominal.plant.lever.torque(samples[:, 0], samples[:, 1])
+        stance = known & self._wholly_in_stance(plan, times, now)
+        nominal = self.stride.torque((now.place + plan.shift)[:, None] + times)
+        excess = now.past - np.where(stance, planned, nominal)
+        first = np.minimum(back, plan.seen.step[:, None])  # nothing was sensed before the start
+        return self._predictor.predict(np.take_along_axis(excess, first, axis=1), ends)
+
+    @cached_property
+    def _predictor(self) -> TorqueAhead:
+        farthest = np.max(self.bank.dead_time) / self.bank.period + ENDS[-1]
+        return TorqueAhead(math.ceil(farthest) + 1)
 
     def _stiffness(self, demand: Demand, angle: Array) -> Array:
         """Return the demanded stiffnesses [N/m] at angles [rad] of the nodes."""

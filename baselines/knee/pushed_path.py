@@ -26,7 +26,7 @@ from baselines.predictive.rate_limited import descend_row
 from pam_envs.arrays import Array
 from pam_envs.kernels.build import entry, kernel
 
-ITERATIONS = 20
+ITERATIONS = 6
 """Gradient steps per control period; the next period starts from their result."""
 
 
@@ -52,7 +52,7 @@ class Push(NamedTuple):
 
 
 def pushed_path(
-    start: Array, path: Array, weight: Array, reach: Array, push: Push, response: Array
+    start: Array, path: Array, weight: Array, reach: Array, push: Push, response: Array, most: float
 ) -> tuple[Array, Array]:
     """Return the best path [Pa] and the deviations [rad] that it adds, (n_env, n_nodes).
 
@@ -65,15 +65,17 @@ def pushed_path(
     push : Push
         Torques of the brace.
     response : ndarray, shape (n_env, n_nodes, n_nodes)
-        Deviation at a node over the torque at another [rad/(N m)].
+        Deviation at a node over the torque at another [rad/(N m)]; 0 at earlier nodes.
+    most : float
+        Highest pressure [Pa].
     """
     made, deviation = np.empty_like(path), np.empty_like(path)
     nodes = path.shape[1]
-    matrices, rows = np.empty((3, nodes, nodes)), np.empty((7, nodes))
+    matrices, rows = np.empty((3, nodes, nodes)), np.empty((8, nodes))
     given = (np.ascontiguousarray(part) for part in (start, path, weight, reach))
     model = (np.ascontiguousarray(part) for part in (*push, response))
     scratch = (matrices, rows, np.empty((3, 2 * nodes + 2)))
-    arguments: tuple[Any, ...] = (*given, *model, ITERATIONS, *scratch, made, deviation)
+    arguments: tuple[Any, ...] = (*given, *model, most, ITERATIONS, *scratch, made, deviation)
     push_rows(*arguments)
     return made, deviation
 
@@ -81,49 +83,54 @@ def pushed_path(
 @entry
 def push_rows(
     start: Any, path: Any, weight: Any, reach: Any, excess: Any, per_pressure: Any, per_angle: Any,
-    pressure_per_angle: Any, response: Any, iterations: int, matrices: Any, rows: Any, work: Any,
-    made: Any, deviation: Any,
+    pressure_per_angle: Any, response: Any, most: float, iterations: int, matrices: Any, rows: Any,
+    work: Any, made: Any, deviation: Any,
 ) -> None:  # fmt: skip
-    """Write best paths and deviations; matrices, rows and ``work`` are scratch."""
+    """Write best paths and deviations; matrices, rows and ``work`` are scratch.
+
+    All matrices but the Hessian are lower triangular: no torque moves the knee before it acts.
+    """
     loop, closed, hessian = matrices[0], matrices[1], matrices[2]
-    shift, slope, metric, ahead, old, aim, new = (
-        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6],
+    shift, slope, metric, ahead, old, aim, new, gradient = (
+        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7],
     )  # fmt: skip
     nodes = path.shape[1]
     for i in range(len(start)):
+        close(response[i], per_angle[i], closed)
         for k in range(nodes):
-            for j in range(nodes):
-                closed[k][j] = response[i][k][j]
-                loop[k][j] = (1.0 if j == k else 0.0) - response[i][k][j] * per_angle[i][j]
-        solve(loop, closed)
-        for k in range(nodes):
-            shift[k] = 0.0
-            for j in range(nodes):
+            shift[k], slope[k] = 0.0, 0.0
+            for j in range(k + 1):
                 shift[k] += closed[k][j] * excess[i][j]
                 closed[k][j] *= per_pressure[i][j]
-                own = 1.0 if j == k else 0.0
-                loop[k][j] = own - pressure_per_angle[i][k] * closed[k][j]
+                loop[k][j] = -pressure_per_angle[i][k] * closed[k][j]
+                hessian[k][j], hessian[j][k] = 0.0, 0.0
+            loop[k][k] += 1.0
+        for m in range(nodes):
+            off = weight[i][m] * pressure_per_angle[i][m] * shift[m]
+            for k in range(m + 1):
+                slope[k] += loop[m][k] * off
+                heavy = weight[i][m] * loop[m][k]
+                for j in range(m + 1):
+                    hessian[k][j] += heavy * loop[m][j]
         for k in range(nodes):
-            slope[k], metric[k] = 0.0, 0.0
-            for m in range(nodes):
-                slope[k] += loop[m][k] * weight[i][m] * pressure_per_angle[i][m] * shift[m]
+            metric[k] = 0.0
             for j in range(nodes):
-                total = 0.0
-                for m in range(nodes):
-                    total += loop[m][k] * weight[i][m] * loop[m][j]
-                hessian[k][j] = total
-                metric[k] += abs(total)
+                metric[k] += abs(hessian[k][j])
             aim[k] = path[i][k] - excess[i][k] / per_pressure[i][k]
+            aim[k] = max(0.0, min(most, aim[k]))
         descend_row(start[i], aim, weight[i], reach[i], old, work)
         for k in range(nodes):
             ahead[k] = old[k]
         speed = 1.0
         for _ in range(iterations):
             for k in range(nodes):
-                gradient = -slope[k]
-                for j in range(nodes):
-                    gradient += hessian[k][j] * (ahead[j] - path[i][j])
-                aim[k] = ahead[k] - gradient / metric[k]
+                gradient[k] = -slope[k]
+            for j in range(nodes):
+                off = ahead[j] - path[i][j]
+                for k in range(nodes):
+                    gradient[k] += hessian[j][k] * off
+            for k in range(nodes):
+                aim[k] = max(0.0, min(most, ahead[k] - gradient[k] / metric[k]))
             descend_row(start[i], aim, metric, reach[i], new, work)
             after = 0.5 + (0.25 + speed * speed) ** 0.5
             for k in range(nodes):
@@ -133,26 +140,21 @@ def push_rows(
         for k in range(nodes):
             made[i][k] = old[k]
             deviation[i][k] = shift[k]
-            for j in range(nodes):
+            for j in range(k + 1):
                 deviation[i][k] += closed[k][j] * (old[j] - path[i][j])
 
 
 @kernel
-def solve(matrix: Any, right: Any) -> None:
-    """Overwrite ``right`` by the solution of a system without pivoting, and the matrix."""
-    count = len(matrix)
-    for c in range(count):
-        for r in range(c + 1, count):
-            factor = matrix[r][c] / matrix[c][c]
-            if factor != 0.0:
-                for k in range(c + 1, count):
-                    matrix[r][k] -= factor * matrix[c][k]
-                for k in range(count):
-                    right[r][k] -= factor * right[c][k]
-    for back in range(count):
-        r = count - 1 - back
-        for k in range(count):
-            total = right[r][k]
-            for c in range(r + 1, count):
-                total -= matrix[r][c] * right[c][k]
-            right[r][k] = total / matrix[r][r]
+def close(response: Any, gain: Any, closed: Any) -> None:
+    """Write ``closed`` with ``closed = response (1 + diag(gain) closed)``, lower triangular."""
+    nodes = len(response)
+    for k in range(nodes):
+        for j in range(nodes):
+            closed[k][j] = response[k][j] if j <= k else 0.0
+        for m in range(k):
+            share = response[k][m] * gain[m]
+            for j in range(m + 1):
+                closed[k][j] += share * closed[m][j]
+        share = 1.0 - response[k][k] * gain[k]
+        for j in range(k + 1):
+            closed[k][j] /= share

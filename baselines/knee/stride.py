@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from baselines.core.controller import Rows
 from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
-from pam_envs.kernels.build import entry
+from pam_envs.kernels.build import entry, kernel
 from pam_envs.mechanics.leg import centre_of_pressure
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.references.gait import NATURAL_STRIDE, gait_curves, vertical_load
@@ -52,13 +52,18 @@ class NominalStride:
         return self._planned[2]
 
     @cached_property
+    def torques(self) -> Array:
+        """Torque reference [N m], also in swing, shape (n_points,), evenly over the stride."""
+        return self._planned[4]
+
+    @cached_property
     def stance(self) -> Rows:
         """Stance of the shoe's sensor, shape (n_points,), evenly over the stride."""
         return self._planned[3] > 0.0
 
     @cached_property
     def _planned(self) -> Array:
-        """Tension [N], angle [rad], load [1] and stance, shape (4, n_points)."""
+        """Tension [N], angle [rad], load [1], stance, and torque [N m], shape (5, n_points)."""
         plant, points = self.plant, math.ceil(self.length)
         leg, shoe = plant.leg, plant.shoe
         phases = np.arange(points) / points
@@ -78,9 +83,9 @@ class NominalStride:
             lean = shank + shoe.flat_foot * (ankle - shank)
             torque[i] = RATIO * estimated_torque(force, cop, math.sin(lean), leg.shank)
             stance[i] = heel_load(force, cop, shoe.heel, shoe.tip) > shoe.threshold
-        torque = np.where(stance, filtered(np.tile(torque, 2))[points:], 0.0)
-        tension = np.maximum(plant.lever.tension(torque, angle), 0.0)
-        return np.stack([tension, angle, load, stance])
+        torque = filtered(np.tile(torque, 2))[points:]
+        tension = plant.lever.tension(np.where(stance, torque, 0.0), angle)
+        return np.stack([np.maximum(tension, 0.0), angle, load, stance, torque])
 
     def phase(self, seen: Array, ahead: NDArray[np.int64], sought: Rows, before: Array) -> Array:
         """Return the point of the stride at present [control periods], shape (n_env,).
@@ -110,6 +115,12 @@ class NominalStride:
         """Return the load on the leg [1] at the nearest points of the stride."""
         return self.loads[self._near(points)]
 
+    def torque(self, points: NDArray[np.generic]) -> Array:
+        """Return the torque reference [N m], also in swing, at points of the stride."""
+        count = len(self.torques)
+        at = np.asarray(points * (count / self.length)) % count
+        return np.interp(at, np.arange(count + 1), np.append(self.torques, self.torques[0]))
+
     def in_stance(self, points: NDArray[np.generic]) -> Rows:
         """Return whether the nearest points of the stride are in stance."""
         return self.stance[self._near(points)]
@@ -121,17 +132,32 @@ class NominalStride:
 
 @entry
 def fit_rows(seen: Array, planned: Array, scale: Array, sought: Any, found: Array) -> None:
-    """Write the first point whose planned samples, (2, n_points, n_samples), fit a row best."""
+    """Write the point whose planned samples, (2, n_points, n_samples), fit a row best.
+
+    It is the minimum of the parabola through the misfits of the best point and its neighbours.
+    """
+    points = planned.shape[1]
     for i in range(len(seen)):
-        least = np.inf
-        for point in range(planned.shape[1] if sought[i] else 0):
-            misfit = 0.0
-            for c in range(len(scale)):
-                if misfit >= least:
-                    break
-                for k in range(planned.shape[2]):
-                    off = (seen[i, c, k] - planned[c, point, k]) / scale[c]
-                    misfit += off * off
+        best, least = 0, np.inf
+        for point in range(points if sought[i] else 0):
+            misfit = misfit_at(seen[i], planned, scale, point, least)
             if misfit < least:
-                least = misfit
-                found[i] = float(point)
+                best, least = point, misfit
+        if sought[i]:
+            before = misfit_at(seen[i], planned, scale, (best - 1) % points, np.inf)
+            after = misfit_at(seen[i], planned, scale, (best + 1) % points, np.inf)
+            bend = before - 2.0 * least + after
+            found[i] = best + (0.5 * (before - after) / bend if bend > 0.0 else 0.0)
+
+
+@kernel
+def misfit_at(seen: Any, planned: Any, scale: Any, point: int, most: float) -> float:
+    """Return the sum of squared differences of samples at a point, or one of at least ``most``."""
+    misfit = 0.0
+    for c in range(len(scale)):
+        if misfit >= most:
+            break
+        for k in range(planned.shape[2]):
+            off = (seen[c, k] - planned[c, point, k]) / scale[c]
+            misfit += off * off
+    return misfit

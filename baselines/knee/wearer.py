@@ -107,7 +107,8 @@ class WearerModel:
         found = np.zeros((*ends.shape, ends.shape[1]))
         step = self.plant.control_period / SUBSTEPS
         loads, scales = np.ascontiguousarray(load), np.ascontiguousarray(scale)
-        respond_rows(loads, scales, ends, delay, self._hold, step, found)
+        course = np.empty((6, load.shape[1]))
+        respond_rows(loads, scales, ends, delay, self._hold, step, course, found)
         return found
 
 
@@ -139,31 +140,37 @@ def deviate_rows(
 
 @entry
 def respond_rows(
-    load: Array, scale: Array, ends: Array, delay: Array, hold: Array, step: float, found: Array
-) -> None:
+    load: Array, scale: Array, ends: Array, delay: Array, hold: Array, step: float, course: Any,
+    found: Array,
+) -> None:  # fmt: skip
     """Write the deviation [rad] at each node for a unit torque at each node, (n_env, k, j).
 
     The torque is linear between nodes; that of the first node begins when a setpoint takes effect.
+    What a torque does before its node is left out. ``course``, (6, n), is scratch.
     """
     nodes, last = ends.shape[1], load.shape[1]
     for i in range(len(load)):
+        for m in range(last):
+            course[0][m], course[1][m] = deviated(1.0, 0.0, 0.0, load[i, m], hold, step)
+            course[2][m], course[3][m] = deviated(0.0, 1.0, 0.0, load[i, m], hold, step)
+            course[4][m], course[5][m] = deviated(0.0, 0.0, 1.0, load[i, m], hold, step)
         for j in range(nodes):
-            off, rate, k = 0.0, 0.0, 0
-            for m in range(last):
+            begin = delay[i] if j == 0 else ends[i, j - 1]
+            off, rate, k = 0.0, 0.0, j
+            for m in range(int(begin), last):
                 time = m + 0.5
                 torque = 0.0
-                if time >= delay[i]:
+                if time >= begin:
                     if time <= ends[i, j]:
-                        if j == 0:
-                            torque = 1.0
-                        elif time > ends[i, j - 1]:
-                            torque = (time - ends[i, j - 1]) / (ends[i, j] - ends[i, j - 1])
+                        torque = (time - begin) / (ends[i, j] - begin) if j > 0 else 1.0
                     elif j == nodes - 1:
                         torque = 1.0
                     elif time < ends[i, j + 1]:
                         torque = (ends[i, j + 1] - time) / (ends[i, j + 1] - ends[i, j])
                 before = off * scale[i, m]
-                off, rate = deviated(off, rate, torque, load[i, m], hold, step)
+                moved = course[0][m] * off + course[2][m] * rate + course[4][m] * torque
+                rate = course[1][m] * off + course[3][m] * rate + course[5][m] * torque
+                off = moved
                 after = off * scale[i, m + 1]
                 while k < nodes and ends[i, k] <= m + 1:
                     part = ends[i, k] - m
