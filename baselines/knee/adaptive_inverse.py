@@ -62,7 +62,7 @@ GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
 KNOBS: Bounds = {
     "observer": (0.2, 5.0),
     "memory": (0.2, 5.0),
-    "probe": (0.01, 20.0),
+    "probe": (0.01, 100.0),
 }
 
 
@@ -216,7 +216,7 @@ ENTRIES = {
         "knee_anticipating_adaptive, gain and loop width by least squares, disturbance observer",
         make=make_knee_adaptive_inverse,
         feedback=True,
-        citation="yeh2010; bertsekas2017; thrun2005; beck2009; magill1965; ohnishi1996",
+        citation="yeh2010; bertsekas2017; thrun2005; beck2009; wiener1949; magill1965; ohnishi1996",
         knobs=KNOBS,
     ),
 }

@@ -9,8 +9,9 @@ sensed. The regulator then needs dead time, lag and, for the fall of the tension
 dead time ahead. From there on, the path of the pressure is the best one within the rate limit
 (:mod:`baselines.predictive.rate_limited`; in a gait :mod:`baselines.knee.pushed_path`), with a
 small weight in swing, where the tension is not tracked. Heel contact and toe-off are those of the
-plan, shifted by the wearer's phase (:mod:`baselines.knee.plan`): the switch is anticipated and not
-sensed.
+plan, shifted by the wearer's phase (:mod:`baselines.knee.plan`), and therefore anticipated. While
+stance is sensed, toe-off is planned 20 ms later, because an early switch costs more than a late
+one.
 
 A planned sample is in stance where it differs from the tension of zero torque at the planned angle.
 In swing both are equal but for a constant offset, which is observed there.
@@ -68,7 +69,7 @@ BLOCKS = (1,) * 8 + (2,) * 6 + (4,) * 10
 ANGLE_NOISE = 0.005
 """Difference [rad] of the path from the plan."""
 STANCE_NOISE = 0.02
-"""Difference [rad] of the angle in stance, less the deviation, from the plan."""
+"""Difference [rad] of the sensed angle in stance, less the predicted deviation, from the plan."""
 TORQUE_NOISE = 0.4
 """Difference [N m] of the torque in stance from the plan."""
 USUAL_STRETCH = 0.05
@@ -87,8 +88,11 @@ SPREAD = 0.5**0.5
 """Standard deviation of a stride's beginning over that of durations."""
 EARLY = 0.5
 """Time [periods] before the first sample of a stance from which a node counts as in stance."""
-LATE = 3.0
-"""Time [periods] after the last sample of a stance up to which a node counts as in stance."""
+LATE = 2.0
+"""Time [periods] after the last sample of a stance up to which a node counts as in stance, while
+stance is sensed."""
+RIVAL = 1.0
+"""Distance [N m] of the torque in swing from the nominal stride beyond which it counts as none."""
 FARTHEST = 0.3
 """Largest predicted deviation of the knee [rad]; about the largest that an episode may have."""
 BESIDE = 0.01
@@ -185,6 +189,7 @@ class KneeAnticipation(RowController):
     def initial_state(self, observation: ArrayLike) -> AnticipationState:
         """Return the state at rest under the present setpoint."""
         view, plan = self.observer.read(observation), self.phase.start(self._samples(observation))
+        torque = self.observer.nominal.plant.lever.torque(view.tension, view.angle)
         return AnticipationState(
             self.bank.start(view.set_point),
             self.observer.nominal.inflated(view.set_point),
@@ -193,7 +198,7 @@ class KneeAnticipation(RowController):
             np.full((len(view.set_point), 2), USUAL),
             np.zeros((len(view.set_point), 3)),
             np.tile(YIELDING[:, None], (len(view.set_point), 1, 2)),
-            np.zeros((len(view.set_point), len(ENDS))),
+            np.repeat(torque[:, None], len(ENDS), axis=1),
             np.zeros(len(view.set_point)),
             np.zeros((len(view.set_point), PAST)),
         )
@@ -384,7 +389,7 @@ class KneeAnticipation(RowController):
         """
         assert self.torque is not None and self.stride is not None
         sensed = self._leg.load(self.torque.rows(observation)[1])
-        here = now.place + now.plan.shift
+        here = _point(now)
         present = self.stride.load(here)
         load = self.stride.load(here[:, None] + times)
         both = (sensed > LIGHT) & (present > LIGHT)
@@ -403,7 +408,7 @@ class KneeAnticipation(RowController):
         given = self.torque.rows(observation)[0][:, None, None]
         off = (given - SCALES[:, None] * torque[:, None]) / TORQUE_NOISE
         path = ((view.angle_reference[:, None] - angle) / ANGLE_NOISE)[:, None]
-        ratio = now.yielding[:, 1, 1] / now.yielding[:, 1, 0]
+        ratio = now.yielding[:, 1, 1] / now.yielding[:, 1, 0]  # deviation of the last period
         held = (view.angle - ratio * now.wearer[:, 0])[:, None] - angle
         held = (held / STANCE_NOISE)[:, None]
         fit = np.exp(-0.5 * np.where(stance[..., None], off**2 + held**2, path**2))
@@ -417,19 +422,22 @@ class KneeAnticipation(RowController):
     ) -> Demand:  # fmt: skip
         """Return what is demanded at the nodes.
 
-        The nodes up to ``EARLY`` before heel contact are those of the stance that begins.
+        The nodes up to ``EARLY`` before heel contact are those of the stance that begins. Those up
+        to ``LATE`` after toe-off are in stance while stance is sensed, with the nominal stride's
+        torque.
         """
         nominal, plan, (samples, known) = self.observer.nominal, now.plan, planned
         weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
         if self.torque is None or self.stride is None:
             reference = self._brace_stiffness(now, ends, samples[:, 0])
             return Demand(np.ones_like(known), reference, np.zeros_like(ends), weight)
-        lever, place = nominal.plant.lever, (now.place + plan.shift)[:, None]
+        lever, place = nominal.plant.lever, _point(now)[:, None]
         stance = self._wholly_in_stance(plan, ends, now)
         soon = self._wholly_in_stance(plan, ends + EARLY, now) & ~stance
         samples = np.where(soon[:, None], self._ahead(now, ends + EARLY)[0], samples)
         torque = lever.torque(samples[:, 0], samples[:, 1])
-        late = self._wholly_in_stance(plan, ends - LATE, now) & view.stance[:, None] & ~stance
+        late = self._wholly_in_stance(plan, ends - LATE, now) & view.stance[:, None]
+        late &= ~(stance | soon)
         torque = np.where(late, self.stride.torque(place + ends), torque)
         stance |= late
         torque = torque + self._excess_ahead(now, ends)
@@ -443,7 +451,7 @@ class KneeAnticipation(RowController):
     def _excess_ahead(self, now: AnticipationState, ends: Array) -> Array:
         """Return the distances [N m] of the torque from the plan at the nodes.
 
-        The plan has no torque in swing, where it is that of the nominal stride.
+        In swing, where the plan has no torque, the distance is that from the nominal stride.
         """
         assert self.stride is not None
         plan, back = now.plan, np.arange(PAST)
@@ -451,8 +459,9 @@ class KneeAnticipation(RowController):
         samples, known = self.phase.read(plan, times)
         planned = self.observer.nominal.plant.lever.torque(samples[:, 0], samples[:, 1])
         stance = known & self._wholly_in_stance(plan, times, now)
-        nominal = self.stride.torque((now.place + plan.shift)[:, None] + times)
-        excess = now.past - np.where(stance, planned, nominal)
+        swing = now.past - self.stride.torque(_point(now)[:, None] + times)
+        swing = np.where(np.abs(swing) < RIVAL, swing, 0.0)
+        excess = np.where(stance, now.past - planned, swing)
         first = np.minimum(back, plan.seen.step[:, None])  # nothing was sensed before the start
         return self._predictor.predict(np.take_along_axis(excess, first, axis=1), ends)
 
@@ -542,6 +551,11 @@ class KneeAnticipation(RowController):
         return np.asarray(np.abs(tension - free - now.offset[:, None]) > SMALLEST)
 
 
+def _point(now: AnticipationState) -> Array:
+    """Return the wearer's point in the nominal stride [control periods], shape (n_env,)."""
+    return np.asarray(now.place + now.plan.shift)
+
+
 def _planned_torque(now: AnticipationState, ends: Array, times: Array) -> Array:
     """Return the torques [N m] planned in the last period at times, (n_env, n_times)."""
     rows = zip(times, ends - 1.0, now.torque, strict=True)
@@ -580,7 +594,7 @@ ANTICIPATION = partial(
     Entry,
     knowledge="nominal model",
     preview=True,
-    citation="yeh2010; bertsekas2017; thrun2005; beck2009",
+    citation="yeh2010; bertsekas2017; thrun2005; beck2009; wiener1949",
     envs=KNEE,
     plants=(KneeOrthosis,),
 )
@@ -593,6 +607,6 @@ ENTRIES = {
         "knee_anticipating, its regulator and gain estimated from sensed pressure and tension",
         make=partial(make_knee_anticipation, adaptive=True),
         feedback=True,
-        citation="yeh2010; bertsekas2017; thrun2005; beck2009; magill1965",
+        citation="yeh2010; bertsekas2017; thrun2005; beck2009; wiener1949; magill1965",
     ),
 }

@@ -30,7 +30,7 @@ GAIN = 0.5
 """Share of an error that is learned: it halves from stride to stride if the inverse is exact."""
 LARGEST = 60.0
 """Largest correction [N], a third of the tension at heel contact."""
-KNOBS: Bounds = {"learning": (0.002, 3.0)}
+KNOBS: Bounds = {"learning": (1e-4, 3.0)}
 
 
 class RepetitiveState(NamedTuple):
@@ -75,8 +75,8 @@ ENTRIES = {
         "knee_anticipating_adaptive, and learning of the error from stride to stride",
         make=make_knee_repetitive,
         feedback=True,
-        citation="yeh2010; bertsekas2017; thrun2005; beck2009; magill1965; bristow2006; "
-        "longman2000",
+        citation="yeh2010; bertsekas2017; thrun2005; beck2009; wiener1949; magill1965; "
+        "bristow2006; longman2000",
         envs=GAIT,
         knobs=KNOBS,
     ),

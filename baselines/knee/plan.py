@@ -5,9 +5,10 @@ per cent of it.
 
 The shift between plan and wearer is estimated by a histogram filter (thrun2005): probabilities of
 shifts on a grid spread from period to period and are multiplied by the likelihood of what is
-observed: swing or stance, in swing the path of the knee, in stance the torque. The torque has an
-unknown scale, since the wearer may be heavier or lighter than planned: a second axis of the grid. A
-linearised filter diverges where path or torque have a turning point.
+observed: swing or stance, in swing the path of the knee, in stance the torque and the angle less
+the predicted deviation. The torque has an unknown scale, since the wearer may be heavier or lighter
+than planned: a second axis of the grid. A linearised filter diverges where path or torque have a
+turning point.
 
 Times are in control periods from the start of the episode.
 """

@@ -9,9 +9,9 @@ that of the pushed knee. The deviation ``d`` at the nodes is linear in the torqu
 
 where ``p*`` is the pressure that gives the desired tension at the angle predicted with the torques
 ``tau_0``, and ``tau*`` the torque then. An error of the tension, as a pressure, is
-``e = p - p* - C d``. The least sum of squares of ``e`` within the rate limit is found by
-accelerated proximal gradient steps (beck2009), each of which is a best rate-limited path with
-diagonal weights.
+``e = p - p* - C d``. The least sum of squares of ``e`` within the rate limit is approximated
+by accelerated proximal gradient steps (beck2009), each of which is a best rate-limited path with
+diagonal weights towards pressures between 0 and the highest one.
 
 This path uses the knee as a second actuator where the rate limit is in the way: before heel contact
 it lets the knee flex, so that the leg, which then bears weight and straightens, lowers the tension
@@ -27,7 +27,8 @@ from pam_envs.arrays import Array
 from pam_envs.kernels.build import entry, kernel
 
 ITERATIONS = 6
-"""Gradient steps per control period; the next period starts from their result."""
+"""Gradient steps per control period. The torques of their result are those that the next period
+starts from, so that the first periods of an episode are less exact."""
 
 
 class Push(NamedTuple):
@@ -65,7 +66,8 @@ def pushed_path(
     push : Push
         Torques of the brace.
     response : ndarray, shape (n_env, n_nodes, n_nodes)
-        Deviation at a node over the torque at another [rad/(N m)]; 0 at earlier nodes.
+        Deviation at a node over the torque at another [rad/(N m)]; 0 at nodes before that
+        of the torque.
     most : float
         Highest pressure [Pa].
     """
@@ -146,7 +148,7 @@ def push_rows(
 
 @kernel
 def close(response: Any, gain: Any, closed: Any) -> None:
-    """Write ``closed`` with ``closed = response (1 + diag(gain) closed)``, lower triangular."""
+    """Solve ``closed = response (1 + diag(gain) closed)`` for ``closed``, lower triangular."""
     nodes = len(response)
     for k in range(nodes):
         for j in range(nodes):

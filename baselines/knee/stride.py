@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from baselines.core.controller import Rows
 from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY
-from pam_envs.kernels.build import entry, kernel
+from pam_envs.kernels.build import entry
 from pam_envs.mechanics.leg import centre_of_pressure
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.references.gait import NATURAL_STRIDE, gait_curves, vertical_load
@@ -118,8 +118,8 @@ class NominalStride:
     def torque(self, points: NDArray[np.generic]) -> Array:
         """Return the torque reference [N m], also in swing, at points of the stride."""
         count = len(self.torques)
-        at = np.asarray(points * (count / self.length)) % count
-        return np.interp(at, np.arange(count + 1), np.append(self.torques, self.torques[0]))
+        known = np.arange(count) * (self.length / count)
+        return np.interp(np.asarray(points, float), known, self.torques, period=self.length)
 
     def in_stance(self, points: NDArray[np.generic]) -> Rows:
         """Return whether the nearest points of the stride are in stance."""
@@ -134,30 +134,30 @@ class NominalStride:
 def fit_rows(seen: Array, planned: Array, scale: Array, sought: Any, found: Array) -> None:
     """Write the point whose planned samples, (2, n_points, n_samples), fit a row best.
 
-    It is the minimum of the parabola through the misfits of the best point and its neighbours.
+    The nearest point is refined to a fraction of a period by least squares of the angle, which,
+    unlike the tension, has no jump.
     """
     points = planned.shape[1]
     for i in range(len(seen)):
-        best, least = 0, np.inf
+        best, least = -1, np.inf
         for point in range(points if sought[i] else 0):
-            misfit = misfit_at(seen[i], planned, scale, point, least)
+            misfit = 0.0
+            for c in range(len(scale)):
+                if misfit >= least:
+                    break
+                for k in range(planned.shape[2]):
+                    off = (seen[i, c, k] - planned[c, point, k]) / scale[c]
+                    misfit += off * off
             if misfit < least:
                 best, least = point, misfit
-        if sought[i]:
-            before = misfit_at(seen[i], planned, scale, (best - 1) % points, np.inf)
-            after = misfit_at(seen[i], planned, scale, (best + 1) % points, np.inf)
-            bend = before - 2.0 * least + after
-            found[i] = best + (0.5 * (before - after) / bend if bend > 0.0 else 0.0)
-
-
-@kernel
-def misfit_at(seen: Any, planned: Any, scale: Any, point: int, most: float) -> float:
-    """Return the sum of squared differences of samples at a point, or one of at least ``most``."""
-    misfit = 0.0
-    for c in range(len(scale)):
-        if misfit >= most:
-            break
-        for k in range(planned.shape[2]):
-            off = (seen[c, k] - planned[c, point, k]) / scale[c]
-            misfit += off * off
-    return misfit
+        if best >= 0:
+            product, square = 0.0, 1e-12
+            for k in range(planned.shape[2]):
+                after, before = (
+                    planned[1, (best + 1) % points, k],
+                    planned[1, (best - 1) % points, k],
+                )
+                rate = 0.5 * (after - before)
+                product += rate * (seen[i, 1, k] - planned[1, best, k])
+                square += rate * rate
+            found[i] = best + max(-1.0, min(1.0, product / square))

@@ -146,7 +146,7 @@ def respond_rows(
     """Write the deviation [rad] at each node for a unit torque at each node, (n_env, k, j).
 
     The torque is linear between nodes; that of the first node begins when a setpoint takes effect.
-    What a torque does before its node is left out. ``course``, (6, n), is scratch.
+    Nodes before that of the torque are left at 0. ``course``, (6, n), is scratch.
     """
     nodes, last = ends.shape[1], load.shape[1]
     for i in range(len(load)):

@@ -35,13 +35,14 @@ def problem(push_scale: float = 1.0):
         pressure_per_angle=draws.uniform(-2e6, -5e5, shape),
     )
     response = -push_scale * np.tril(draws.uniform(0.0, 8e-4, (ROWS, NODES, NODES)))
-    return start, path, weight, reach, push, response
+    return start, path, weight, reach, push, response, 1e6
 
 
 def test_path_is_the_solution_of_the_bounded_least_squares_problem(monkeypatch):
     monkeypatch.setattr(pushed_path, "ITERATIONS", 3000)
-    start, path, weight, reach, push, response = problem()
-    found, deviation = pushed_path.pushed_path(start, path, weight, reach, push, response)
+    given = problem()
+    start, path, weight, reach, push, response, _ = given
+    found, deviation = pushed_path.pushed_path(*given)
     for row in range(ROWS):
         inner = np.eye(NODES) - response[row] * push.per_angle[row]
         closed = np.linalg.solve(inner, response[row])
@@ -61,7 +62,7 @@ def test_path_is_the_solution_of_the_bounded_least_squares_problem(monkeypatch):
 
 def test_iterations_remove_most_of_the_avoidable_cost(monkeypatch):
     given = problem()
-    _, path, weight, reach, push, _ = given
+    _, path, weight, reach, push, *_ = given
 
     def costs(iterations):
         monkeypatch.setattr(pushed_path, "ITERATIONS", iterations)
@@ -76,10 +77,20 @@ def test_iterations_remove_most_of_the_avoidable_cost(monkeypatch):
 
 
 def test_rigid_knee_has_the_best_path_of_a_given_angle():
-    start, path, weight, reach, push, response = problem(push_scale=0.0)
-    found, deviation = pushed_path.pushed_path(start, path, weight, reach, push, response)
+    given = problem(push_scale=0.0)
+    start, path, weight, reach, *_ = given
+    found, deviation = pushed_path.pushed_path(*given)
     np.testing.assert_allclose(found, best_path(start, path, weight, reach), atol=1e-3)
     assert not deviation.any()
+
+
+def test_path_stays_within_the_capacity():
+    *given, _ = problem()
+    free, _ = pushed_path.pushed_path(*given, 1e6)
+    most = float(given[0].max())
+    assert free.max() > most
+    found, _ = pushed_path.pushed_path(*given, most)
+    assert 0.0 <= found.min() <= found.max() <= most + 1e-6
 
 
 def contact_errors(push: bool, monkeypatch) -> np.ndarray:

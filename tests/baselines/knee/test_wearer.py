@@ -35,7 +35,7 @@ def test_deviation_of_the_nominal_leg_is_that_of_the_plant():
         observation, _, _, over, info = env.step(action)
     found, true, stance = np.array(pairs)[100:].T
     assert np.ptp(true[stance > 0.5]) > 0.04
-    assert rms((found - true)[stance > 0.5]) < 0.001
+    assert rms((found - true)[stance > 0.5]) < 0.02 * np.ptp(true[stance > 0.5])
 
 
 def test_prediction_is_not_late():
@@ -81,9 +81,11 @@ def test_brace_is_carried_along_a_path():
     assert torque == pytest.approx(plant.lever.damping * rate + plant.lever.inertia * 3.0)
 
 
-def test_response_is_the_derivative_of_the_course():
+@pytest.mark.parametrize(("delay", "tolerance"), [((4.0, 6.0), 1e-12), ((4.5, 5.3), 4e-4)])
+def test_response_is_the_derivative_of_the_course(delay, tolerance):
+    """Of a dead time that is no whole number, what a torque does before its node is left out."""
     leg, draws = WearerModel(KneeOrthosis.on_leg()), np.random.default_rng(1)
-    delay = np.array([4.5, 6.0])
+    delay = np.array(delay)
     ends = delay[:, None] + np.cumsum([1, 1, 1, 2, 2, 4, 4])
     count = int(np.ceil(ends.max())) + 1
     load, scale = draws.uniform(0.0, 1.0, (2, count)), draws.uniform(0.5, 2.0, (2, count + 1))
@@ -94,7 +96,8 @@ def test_response_is_the_derivative_of_the_course():
     times = np.arange(count + 1)
     off = [np.interp(ends[i], times, course[i]) for i in range(2)]
     made = leg.response(load, scale, ends, delay)
-    np.testing.assert_allclose((made @ torque[..., None])[..., 0], off, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose((made @ torque[..., None])[..., 0], off, atol=tolerance)
+    assert not np.triu(made, 1).any()
 
 
 def test_load_and_stance_are_those_of_the_leg():
@@ -121,7 +124,7 @@ def test_nominal_stride_is_the_planned_one(name):
         off.append(seen[0, :, -1] - stride.read(place[:, None] + ahead[-1])[:, 0, 0])
         places.append(place[0] - step)
         observation, *_ = env.step(env.action_space.low)
-    assert len(np.unique(np.mod(places, 500))) == 1
+    assert np.ptp(np.unwrap(places, period=500.0)) < 0.1
     tension, angle = np.abs(off).T
     assert np.median(tension) < 1.0
     assert angle.max() < 0.01
@@ -138,8 +141,34 @@ def test_point_of_the_stride_is_the_one_of_least_misfit():
     misfit = (((seen[:, :, None] - stride.read(every)) / scale) ** 2).sum(axis=(1, 3))
     sought = np.array([True, True, False])
     found = stride.phase(seen, ahead, sought, np.array([0.0, 0.0, 91.5]))
-    assert list(found) == [*np.argmin(misfit[:2], axis=1), 91.5]
+    assert np.abs(found[:2] - np.argmin(misfit[:2], axis=1)).max() <= 0.5
     assert np.abs(found[:2] - true[:2]).max() <= 3.0
+    assert found[2] == 91.5
+
+
+def test_point_of_the_stride_is_found_between_samples():
+    stride = NominalStride(KneeOrthosis.on_leg("walk"))
+    ahead, true = np.arange(5, 60, 5), 40.0 + np.linspace(0.0, 1.0, 11)
+    low = stride.read(np.floor(true)[:, None] + ahead)
+    high = stride.read(np.floor(true)[:, None] + ahead + 1)
+    seen = (low + (true % 1.0)[:, None] * (high - low)).swapaxes(0, 1)
+    found = stride.phase(seen, ahead, np.ones(11, bool), np.zeros(11))
+    np.testing.assert_allclose(found, true, atol=0.02)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_torque_of_the_nominal_stride_is_the_reference_also_in_swing(name):
+    plant = KneeOrthosis.on_leg(GAITS[name]).without_noise()
+    env = make_env(f"PAM/{name}-v0", plant=plant, strides="identical", episode_seconds=6.0,
+                   start="heel_contact", normalize=False)  # fmt: skip
+    column, found = env.unwrapped.signals["torque_reference"].index, []
+    observation, _ = env.reset(seed=0)
+    for _ in range(590):
+        found.append(observation[column])
+        observation, *_ = env.step(np.zeros(1))
+    expected = NominalStride(plant).torque(np.arange(590.0))
+    assert np.ptp(expected) > 5.0
+    assert np.abs(np.array(found) - expected)[20:].max() < 0.05 * np.ptp(expected)
 
 
 def test_unseen_stride_continues_the_preview():
