@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
-from rich.console import Console
 
 from agents.settings import presets as configs
 from agents.settings.schema import SettingsError
@@ -61,6 +60,8 @@ def train(
             this command.
         config: YAML file or policy.onnx whose settings replace the preset.
     """
+    from rich.console import Console
+
     from agents.training import sweep as sweeping
     from agents.training import train as training
     from agents.training.record import CHECKPOINT, Run
@@ -328,6 +329,8 @@ def tune(
         storage: SQLite file; default: runs/tune/ENV.ALGO.db. Several processes may share it.
         write: Write the best settings and the budget into the preset's file.
     """
+    from rich.console import Console
+
     from agents.search import tune as tuning
 
     _check_counts(trials=(trials, 1), steps=(steps, 1), seed=(seed, 0))
@@ -428,7 +431,11 @@ def main(arguments: list[str] | None = None) -> int:
         )
     except ModuleNotFoundError as error:
         extra = "data" if error.name == "minari" else "agents"
-        print(f"error: training needs {error.name}; install the extra {extra!r}", file=sys.stderr)
+        print(
+            f"error: this command needs {error.name}, which is not installed: "
+            f'pip install "pam-envs[{extra}]"',
+            file=sys.stderr,
+        )
         return 2
 
 

@@ -177,6 +177,30 @@ def test_agents_run_from_the_wheel(installed, tmp_path):
     assert "PAM/KneeWalk-v0  ppo  " in said
 
 
+WITHOUT_EXTRAS = """
+import sys
+wheel, *command = sys.argv[1:]
+sys.path.insert(0, wheel)
+for name in ("filelock", "joblib", "minari", "onnx", "onnxruntime", "rich", "ruamel", "torch"):
+    sys.modules[name] = None
+from pam_envs.agents.__main__ import main
+assert sys.modules["pam_envs"].__file__.startswith(wheel)
+print("status", main(command))
+"""
+
+
+@pytest.mark.parametrize(
+    "command", ["train KneeTension-v0", "evaluate policy.onnx", "watch policy.onnx"]
+)
+def test_agents_without_their_extra_name_it(command, installed, tmp_path):
+    arguments = [sys.executable, "-P", "-c", WITHOUT_EXTRAS, str(installed), *command.split()]
+    made = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert made.stdout == "status 2\n"
+    (line,) = made.stderr.splitlines()
+    assert line.startswith("error: this command needs ")
+    assert line.endswith('which is not installed: pip install "pam-envs[agents]"')
+
+
 def test_names_of_the_wheel_are_the_same_modules_in_the_checkout():
     from pam_envs.baselines.core import catalogue
 

@@ -18,7 +18,8 @@ a virgin hysteresis is at rest.
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, reduce
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -112,7 +113,8 @@ def contraction_plays(drive: str = "pressure") -> PlayOperator:
 
 def angle_plays() -> PlayOperator:
     """Return the reduced plant's preset, identified on loops of the plant with muscles."""
-    return PlayOperator(ANGLE_THRESHOLDS, ANGLE_WEIGHTS, 1.0 - sum(ANGLE_WEIGHTS))
+    total = reduce(add, ANGLE_WEIGHTS)  # sum() rounds differently from Python 3.12 on
+    return PlayOperator(ANGLE_THRESHOLDS, ANGLE_WEIGHTS, 1.0 - total)
 
 
 ANGLE_THRESHOLDS = (0.02, 0.04, 0.08, 0.12, 0.16, 0.2)
