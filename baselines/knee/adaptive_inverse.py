@@ -61,8 +61,7 @@ GAINS, WIDTHS = (0.5, 2.0), (0.5, 1.25)
 """Limits of ``a`` and of the width ``b / a``; a wider loop would have no increasing inverse."""
 KNOBS: Bounds = {
     "observer": (0.2, 5.0),
-    "memory": (0.2, 5.0),
-    "probe": (0.01, 100.0),
+    "memory": (0.2, 20.0),
 }
 
 
@@ -128,7 +127,6 @@ class KneeAdaptiveInverse(RowController):
     forward: KneeAnticipation
     observer: float
     forgetting: float
-    probe: float
 
     def initial_state(self, observation: ArrayLike) -> AdaptiveState:
         """Return the state at rest under the present setpoint, with nominal estimates."""
@@ -148,7 +146,7 @@ class KneeAdaptiveInverse(RowController):
         """Return the pressure [Pa] that shows the regulator in a first swing, shape (n_env,)."""
         step = forward.plan.seen.step
         free = ~self.forward.observer.read(observation).stance
-        return np.where(free & (step >= PROBE[0]) & (step < PROBE[1]), self.probe, 0.0)
+        return np.where(free & (step >= PROBE[0]) & (step < PROBE[1]), PRESSURE, 0.0)
 
     def _probed(
         self, now: AdaptiveState, probe: Array, stiffness: Array, later: RowsState
@@ -208,7 +206,7 @@ def make_knee_adaptive_inverse(spec: Spec[KneeOrthosis]) -> KneeAdaptiveInverse:
     share = -math.expm1(-period / (spec.knob("observer") * OBSERVER))
     forward = BendingAnticipation(**vars(made), bending=bending, share=share)
     forgetting = math.exp(-period / (spec.knob("memory") * MEMORY))
-    return KneeAdaptiveInverse(forward, share, forgetting, spec.knob("probe") * PRESSURE)
+    return KneeAdaptiveInverse(forward, share, forgetting)
 
 
 ENTRIES = {
