@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
+from threadpoolctl import threadpool_limits
 from tyro.conf import Positional, arg
 
 from benchmarks.runs import controllers, rows, runner
@@ -731,11 +732,14 @@ def main(arguments: list[str] | None = None) -> int:
     """Run a command and return the exit code; a wrong argument is one sentence, no traceback."""
     ask = tyro.extras.subcommand_cli_from_dict
     os.environ.setdefault("PAM_ENVS_COMPILE", "wait")  # rates are of machine code
-    return run_cli(
-        lambda: ask(COMMANDS, prog="python -m benchmarks", args=arguments),
-        "interrupted; no file is half-written; completed cells, cases and trials are kept, and the "
-        "same command resumes",
-    )
+    # designs round alike on every number of cores: libraries loaded later, and those loaded now
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    with threadpool_limits(1, "blas"):
+        return run_cli(
+            lambda: ask(COMMANDS, prog="python -m benchmarks", args=arguments),
+            "interrupted; no file is half-written; completed cells, cases and trials are kept, and "
+            "the same command resumes",
+        )
 
 
 if __name__ == "__main__":

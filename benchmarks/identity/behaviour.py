@@ -31,6 +31,7 @@ SCALES = (1.0, 0.25, 1.0, 0.25)
 With small errors fewer actions are saturated, where they would carry no information.
 """
 TOLERANCE = 1e-6  # largest difference of two actions, in action ranges, that counts as rounding
+FLIPPED = 0.01  # share of actions that may differ: a setpoint is rounded to the valve's resolution
 DIGITS = 10  # significant digits of a score; sums of numpy may differ beyond them
 
 Array = NDArray[np.float32]
@@ -104,10 +105,15 @@ def of_controller(controller: Any, observations: Sequences, space: Any) -> Array
 
 
 def difference(first: Array, second: Array) -> float:
-    """Return the largest difference of actions in action ranges; infinite for different shapes."""
+    """Return the largest difference of actions in action ranges, except ``FLIPPED`` of them.
+
+    It is infinite for different shapes.
+    """
     if first.shape != second.shape or not np.array_equal(np.isnan(first), np.isnan(second)):
         return float("inf")
-    return float(np.nanmax(np.abs(first - second), initial=0.0))
+    apart = np.sort(np.abs(first - second)[~np.isnan(first)])
+    kept = len(apart) - int(FLIPPED * len(apart))
+    return float(apart[kept - 1]) if kept else 0.0
 
 
 def pack(given: Array) -> dict[str, Any]:

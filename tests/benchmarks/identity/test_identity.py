@@ -160,6 +160,14 @@ def test_rounding_of_a_design_does_not_change_its_identity(factor, voids, before
     assert bool(made.changes(before[NAMES[0]]["artefact"])) is voids
 
 
+@pytest.mark.parametrize(("flips", "voids"), [(1, False), (2, True)])
+def test_one_rounded_setpoint_in_a_hundred_may_flip(flips, voids):
+    first = np.zeros((100, 1), np.float32)
+    second = first.copy()
+    second[:flips] = 1e-3
+    assert (behaviour.difference(first, second) > behaviour.TOLERANCE) is voids
+
+
 def test_policy_is_identified_by_its_file_and_the_controller_that_it_corrects(monkeypatch):
     track = short("knee_tension_nominal")
     residual = find("residual_knee_tension")
