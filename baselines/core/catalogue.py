@@ -110,6 +110,8 @@ def make_controller(
     ValueError
         If the controller does not exist, has no such knob or value, or is for another class of
         plants.
+    ModuleNotFoundError
+        If its design needs a package that is not installed; the message names the extra.
     """
     entry = CONTROLLERS.get(name)
     if entry is None:
@@ -124,7 +126,14 @@ def make_controller(
             )
         )
     factors = {**entry.found, **knobs}
-    made: Controller = entry.make(Spec(plant, signals, action_signals, factors, seed))
+    try:
+        made: Controller = entry.make(Spec(plant, signals, action_signals, factors, seed))
+    except ModuleNotFoundError as error:
+        extra = "synthesis" if error.name == "slycot" else "baselines"
+        raise ModuleNotFoundError(
+            f"{name} needs {error.name}, which is not installed: pip install 'pam-envs[{extra}]'",
+            name=error.name,
+        ) from error
     return made
 
 

@@ -261,6 +261,7 @@ class Study:
                 if channel == "contraction":
                     measured[k][exchanges(recording)] = np.nan
                 noise[k] = max(_noise(floor[channel]), 1e-3 * fallbacks[channel])
+        measured = kind.compared(measured, family, recording.restart)
         ticks = np.asarray(np.arange(len(recording.time)) * recording.period, np.float64)
         blocks = Blocks.make(ticks, measured)
         shapes = shapes_of(recording, sheet)
@@ -333,7 +334,7 @@ class Study:
     def flexible(self) -> FlexibleBase:
         """Selection of the differences in which rigs commonly depart from the base."""
         data = (self.problem, self.family, self.blocks, self.base, self.rule)
-        return FlexibleBase(*data, self.fitted.guess, self.fitted.rate, self.fitted.linear)
+        return FlexibleBase(*data, self.fitted.guesses, self.fitted.rate, self.fitted.linear)
 
     def make_flexible(self, causes: Sequence[Cause]) -> None:
         """Add the common differences that the recording needs to the base."""

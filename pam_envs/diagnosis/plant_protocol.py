@@ -6,11 +6,11 @@ recording, which replays parameter columns. Search, decision, held-out compariso
 figures use these two alone.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from pam_envs.arrays import Array
+from pam_envs.arrays import Array, Flags
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import Audit
@@ -140,7 +140,7 @@ class Fitted(Protocol):
         """The fitted base."""
 
     @property
-    def guess(self) -> dict[str, float]:
+    def guesses(self) -> Sequence[Mapping[str, float]]:
         """Starting values by parameter, of the base and its common differences."""
 
     @property
@@ -190,6 +190,12 @@ class Kind(Protocol):
 
     def audit(self, recording: Recording, sheet: Rig) -> Audit:
         """Return the findings on a recording before its diagnosis."""
+
+    def compared(self, measured: Array, family: Bound, restart: Flags) -> Array:
+        """Return readings (channels, T), NaN where they are not compared with a simulation.
+
+        ``restart`` marks the first sample of each run, (T,).
+        """
 
     def calibrate(
         self,

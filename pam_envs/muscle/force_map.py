@@ -27,7 +27,7 @@ from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
 from pam_envs.muscle.effects import LengthYieldEffects, TemperatureEffects
 from pam_envs.muscle.law_correction import FIELDS, LawCorrection
-from pam_envs.parameters import assumed, declarations, derived, identified, published
+from pam_envs.parameters import assumed, declarations, derived, effect, identified, published
 
 _FIT = "least squares on the measured map of a DMSP-10-250 (data/dmsp10_force_map.csv)"
 FULL_PRESSURE = 6.5e5
@@ -42,13 +42,16 @@ class ForceMap(LawCorrection, LengthYieldEffects, TemperatureEffects):
 
     ``stretch`` lengthens the axis of contraction. Inverses of the law do not use ``gain`` and
     ``imbalance``, which describe the specimens: muscle A pulls ``gain (1 + imbalance)`` times the
-    law, muscle B ``gain (1 - imbalance)`` times. Nor do they use the correction of the law.
+    law, muscle B ``gain (1 - imbalance)`` times. Nor do they use the correction of the law. The
+    friction of muscle A is ``1 + friction_imbalance`` times that of the hysteresis, that of B
+    ``1 - friction_imbalance`` times.
     """
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
         *TemperatureEffects.effects,
         tuple(declarations(LengthYieldEffects)),
         FIELDS,
+        ("friction_imbalance",),
     )
 
     area: float = identified(8.9128e-4, "m2", 1e-5, 1e-2, _FIT)
@@ -77,6 +80,9 @@ class ForceMap(LawCorrection, LengthYieldEffects, TemperatureEffects):
         "share by which A is stronger and B weaker",
         neutral=0.0,
         spread=(-0.05, 0.05),
+    )
+    friction_imbalance: float = effect(
+        "1", -0.9, 0.9, "share by which A has more friction and B less"
     )
     viscosity: float = derived(
         1.2e-4,

@@ -3,22 +3,27 @@
     T = s (L - L_min),    s = alpha P  where there is no hysteresis
 
 (yeh2010, Eq. 6). A muscle at its shortest length, or with no stiffness, is slack. The volume is
-the one whose virtual work is this tension, ``T = -P dV/dL``.
+the one whose virtual work is this tension, ``T = -P dV/dL``, without its correction
+(:mod:`pam_envs.muscle.law_correction`).
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
 from pam_envs.muscle.effects import TemperatureEffects
+from pam_envs.muscle.law_correction import FIELDS, LawCorrection
 from pam_envs.parameters import assumed, derived
 
 
 @dataclass(frozen=True)
-class GasSpring(TemperatureEffects):
-    """The muscle of the orthosis."""
+class GasSpring(LawCorrection, TemperatureEffects):
+    """The muscle of the orthosis; inverses of its law do not use the correction."""
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (*TemperatureEffects.effects, FIELDS)
 
     shortest_length: float = assumed(0.17, "m", 0.02, 1.0, "L_min: 5 cm below yeh2010's nominal")
     gain: float = assumed(

@@ -11,6 +11,7 @@ from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.muscle.gas_spring import gas_volume
 from pam_envs.plants.knee_orthosis.hysteresis import FULL_STIFFNESS, knee_hysteresis
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from pam_envs.plants.knee_orthosis.rollout import simulate_knee
 
 POINTS = ((0.5e5, 56.7), (0.75e5, 80.6), (2e5, 158.0), (4.5e5, 211.5))
 """Pressure [Pa] and tension [N] of the brace without load and without hysteresis."""
@@ -116,3 +117,18 @@ def test_plant_file_with_a_wrong_choice_is_named(tmp_path: Path) -> None:
     path.write_text("schema: 1\nfamily: knee_orthosis\nmounting: shelf\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"rig\.yaml: mounting = 'shelf'"):
         KneeOrthosis.from_yaml(path)
+
+
+@pytest.mark.parametrize("kind", ["none", "maxwell_slip_length"])
+def test_brace_rests_where_the_corrected_tension_balances_its_wire(kind: str) -> None:
+    held = {"hysteresis.friction": 0.0} if kind != "none" else {}
+    plain = KneeOrthosis.no_load(kind).replace({"muscle.map_pressure": 4.5e5, **held})
+    plant = plain.replace({"muscle.map_00": -12.0, "muscle.map_11": 6.0, "muscle.map_20": 4.0})
+    pressure = 2e5
+    stiffness = plant.muscle.gain * plant.muscle.stiffness_ratio * pressure
+    made = simulate_knee(plant, np.full(400, pressure), compiled=False)
+    angle = float(plant.angle_at(stiffness, pressure))
+    assert abs(angle - float(plain.angle_at(stiffness))) > 5e-3
+    assert made["angle"][-1] == pytest.approx(angle, abs=1e-4)
+    length = float(plant.lever.length(made["angle"][-1]))
+    assert made["tension"][-1] == pytest.approx(float(plant.pull(stiffness, pressure, length)))

@@ -132,3 +132,20 @@ def test_yielding_friction_of_the_joint_creates_no_energy(cycles):
     second = taken[:, CYCLE - 1 :].sum(axis=1)
     assert np.abs(strain[:, CYCLE - 1] - strain[:, -1]).max() < 1e-4
     assert (second > 0.3 * limit * np.abs(moved[:, CYCLE - 1 :]).sum(axis=1)).all()
+
+
+def test_friction_of_each_muscle_is_that_of_its_specimen():
+    plain = AntagonisticJoint.paper("maxwell_slip_length").with_lag_alone()
+    plain = plain.replace({"muscle.viscosity": 0.0, "muscle.imbalance": 0.0})
+    plant = plain.replace({"muscle.friction_imbalance": 0.3})
+    share = 1.0 - np.cos(2.0 * np.pi * np.arange(300) / 150)
+    pressures = (3e5 + 0.8e5 * share, 4e5 - 0.8e5 * share)
+    made = simulate_joint(plant, pressures=pressures, compiled=False)
+    assert not made["slack"].any()
+    for m, (side, factor) in enumerate((("a", 1.3), ("b", 0.7))):
+        pressure, strain = made[f"pressure_{side}"], made[f"contraction_{side}"]
+        law = plant.muscle.gain * plant.muscle.law(pressure, strain)
+        usual = friction_of_elements(plant, np.stack([pressure] * 2), np.stack([strain] * 2))[m]
+        found = law - made[f"force_{side}"]
+        assert np.abs(usual).max() > 2.0
+        assert found[150:] == pytest.approx(factor * usual[150:], abs=0.05)

@@ -6,7 +6,7 @@ have been fitted (kennedy2001). A difference that the recording does not need is
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -33,6 +33,9 @@ SETTLING = (0.5, 2.0, 6.0)
 MOST_STARTS = 6
 """Largest number of restarts that have their own settling."""
 ROUNDS = 30
+RACE, LONG_RACE = 2, 8
+"""Rounds after which only the best of several starts continues: with one guess, and with several,
+of which one may be near the optimum and the others at the bottom of another valley."""
 CLEAR = 1.0
 """Gain of a difference from which it is needed without a further look."""
 OBVIOUS = 0.4
@@ -101,7 +104,7 @@ class FlexibleBase:
     blocks: Blocks
     base: Candidate
     rule: Rule
-    guess: Mapping[str, float] = field(default_factory=dict)  # starting values by parameter
+    guesses: Sequence[Mapping[str, float]] = ()  # starting values by parameter
     rate: Form | None = None  # form of the limited rate that the pressure needs
     # whether a linear model may show that a difference is needed, without a refit
     linear: bool = True
@@ -127,9 +130,9 @@ class FlexibleBase:
         plain, fits = self.base.fit, []
         begins: list[tuple[Array, int, Mapping[str, float]]]
         begins = [(plain.z, k, {}) for k in range(STARTS)]
-        if self.guess:
-            guessed = [f.inner(f.within(self.guess.get(f.name, f.start))) for f in plain.frees]
-            begins.append((np.array(guessed), 0, {**self.absent(causes), **self.guess}))
+        for guess in self.guesses:
+            guessed = [f.inner(f.within(guess.get(f.name, f.start))) for f in plain.frees]
+            begins.append((np.array(guessed), 0, {**self.absent(causes), **guess}))
         for begin, k, guess in begins:
             frees = tuple(
                 free
@@ -146,7 +149,8 @@ class FlexibleBase:
             z = np.concatenate([begin, [f.inner(f.within(f.start)) for f in frees]])
             fits.append(restarted(plain, frees=(*plain.frees, *frees), z=z, shared=None))
         fits = lsq.promising(self.problem, fits)
-        lsq.improve(self.problem, fits, 2, 1e-4, lsq.FEW_DAMPINGS)
+        race = LONG_RACE if len(self.guesses) > 1 else RACE
+        lsq.improve(self.problem, fits, race, 1e-4, lsq.FEW_DAMPINGS)
         best = min(fits, key=lambda f: f.cost)
         lsq.improve(self.problem, [best], ROUNDS, 1e-3)
         errors = self.blocks.errors(self.problem.rows(best.residual))

@@ -54,7 +54,15 @@ TITLES = {
 UNEQUAL = Cause(
     name="unequal_muscles",
     title="a difference between the two muscles",
-    forms=(Form("imbalance", (Term("muscle.imbalance", (0.05, -0.05), scale=0.02),)),),
+    forms=(
+        Form(
+            "imbalance",
+            (
+                Term("muscle.imbalance", (0.05, -0.05), scale=0.02),
+                Term("muscle.friction_imbalance", (0.0,), scale=0.1, prior=3.0),
+            ),
+        ),
+    ),
     signature="an angle at equal pressures that grows with the co-contraction",
     neighbours=("sensor_bias", "pressure_dependent_friction"),
     experiment=(
@@ -98,6 +106,8 @@ class PairFamily(RegulatedFamily):
     """Plant whose joints have pairs of muscles, all alike."""
 
     law: ClassVar[str] = "muscle"
+    corrected: ClassVar[tuple[tuple[int, int], ...]] = CORRECTED
+    """Orders in pressure and strain of the terms that the law lacks."""
     last: ClassVar[tuple[str, ...]] = ("muscle.braid_strain",)
 
     def joint_channels(self) -> list[tuple[str, tuple[str, str]]]:
@@ -114,22 +124,25 @@ class PairFamily(RegulatedFamily):
             pressures += [measured[place(name)] for name in pair]
         return grouped(np.concatenate(strains), np.concatenate(pressures), slack=False)
 
-    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
-        """Return starting values of the base from the balance of torques."""
+    def guesses(
+        self, measured: Array, noise: Array, column: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Return starting values of base and flexible base from the balance of torques."""
         joints = self.joint_channels()
         place = self.channels.index
         angles = measured[[place(angle) for angle, _ in joints]]
         if not hasattr(self.plant.hysteresis.operator, "thresholds") or np.any(
             np.isfinite(angles).sum(axis=1) < len(angles.T) // 2
         ):
-            return {}
+            return {}, {}
         gauges = [place(name) for _, pair in joints for name in pair]
         pressures = np.maximum(0.0, self.simulate(column[None])[gauges, :, 0])
         known = np.nan_to_num(angles)
         own, whole = (self.weights_at(known, mass) for mass in (0.0, self.payload()))
         size = float(noise[place(joints[0][0])])
         data = (self.plant, REFERENCE_PRESSURE, angles, size, pressures, own, whole - own)
-        return self.named(PairBalance(*data, self.period).solve())
+        balance = PairBalance(*data, self.period, self.corrected)
+        return self.named(balance.solve()), self.named(balance.flexible())
 
     def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
         """Return starting values at which all friction yields smoothly."""

@@ -56,12 +56,14 @@ class UsualStart:
     linear: ClassVar[bool] = True
     """Whether a linear model may show that a difference is needed, without a refit."""
 
-    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
-        """Return starting values of the base.
+    def guesses(
+        self, measured: Array, noise: Array, column: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Return starting values of the base, and of the flexible base.
 
         From readings (channels, T) with a noise (channels,), and a column with their regulator.
         """
-        return {}
+        return {}, {}
 
     def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
         """Return starting values of the flexible base from the fitted values of the base."""
@@ -353,7 +355,7 @@ def calibrate_compiled(
     problem = dataclasses.replace(
         problem, simulate=family.simulate, tie=family.tie, violations=family.violations
     )
-    law = family.guess(measured, noise, column)
+    law, wide = family.guesses(measured, noise, column)
     usual = start_at_guess(family.base(), dict(found))
     starts = [tuple(free for free in usual if free.name not in family.last)]
     if law:
@@ -363,5 +365,9 @@ def calibrate_compiled(
     if family.last:
         whole = start_at_guess(family.base(), base.fit.values())
         base = fit_base(problem, blocks, column, [whole], ROUNDS, boxed=True)
-    guess = family.flexible_guess(base.fit.values())
-    return Calibration(family, problem, base, guess, None, linear=family.linear)
+    values = base.fit.values()
+    guesses = [family.flexible_guess(values)]
+    if wide:
+        # not from the fit, which a large difference of the muscles may have led astray
+        guesses.append(family.flexible_guess({**{f.name: f.start for f in usual}, **wide}))
+    return Calibration(family, problem, base, tuple(guesses), None, linear=family.linear)

@@ -60,9 +60,11 @@ class BoundArm(PairFamily):
         joints = range(self.plant.stages)
         return [(f"angle_{k}", (f"pressure_{2 * k}", f"pressure_{2 * k + 1}")) for k in joints]
 
-    def guess(self, measured: Array, noise: Array, column: Array) -> dict[str, float]:
+    def guesses(
+        self, measured: Array, noise: Array, column: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
         """Return no starting values: the arm weighs too little for a balance of torques."""
-        return {}
+        return {}, {}
 
     def signal_rows(self) -> Mapping[str, int]:
         """Return the row of state of each torque and force."""

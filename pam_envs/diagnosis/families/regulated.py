@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from pam_envs.arrays import Array
+from pam_envs.arrays import Array, Flags
 from pam_envs.constants import BAR
 from pam_envs.data.recording.channels import WIRINGS
 from pam_envs.data.recording.recording import Recording
@@ -48,6 +48,9 @@ REGULATOR: dict[str, dict[str, Any]] = {
 """Settings of the fit of a regulator's parameters."""
 FALL = 0.5 * BAR
 """Fall of a setpoint [Pa] from which a recording shows the exhaust."""
+FORGOTTEN, FIRST = 0.2, 5
+"""Motion over the range of a recording from which friction has forgotten its start, and the number
+of readings of the rest at the start."""
 RANGE = "map_pressure", "map_least", "map_strain"
 """Parameters of the range of a correction."""
 NOISE = {"angle": 1e-3, "pressure": 1e3, "torque": 0.02, "force": 0.5, "tension": 1.0}
@@ -292,6 +295,26 @@ class RegulatedKind:
     def audit(self, recording: Recording, sheet: Rig) -> Audit:
         """Return the findings on a recording before its diagnosis."""
         return audit_channels(recording, sheet, self.plant.names)
+
+    def compared(self, measured: Array, family: Any, restart: Flags) -> Array:
+        """Return readings (channels, T), without those of motion before friction is known.
+
+        How a plant came to rest before a run decides in which state its friction is, and where
+        between the branches of its loops it rests. Motion by a share of the range forgets it.
+        """
+        made = measured.copy()
+        starts = np.flatnonzero(restart)
+        ends = np.append(starts[1:], len(restart))
+        for channel, values in zip(family.channels, made, strict=True):
+            if channel.startswith("pressure") or not np.isfinite(values).any():
+                continue
+            least = FORGOTTEN * float(np.nanmax(values) - np.nanmin(values))
+            for a, b in zip(starts, ends, strict=True):
+                run = values[a:b]  # a view
+                first = np.nanmedian(run[:FIRST]) if np.isfinite(run[:FIRST]).any() else np.nan
+                moved = np.abs(run - first) > least
+                run[: int(np.argmax(moved)) if moved.any() else 0] = np.nan
+        return made
 
     def calibrate(
         self,

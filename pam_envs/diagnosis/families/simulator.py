@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 import yaml
 
-from pam_envs.arrays import Array
+from pam_envs.arrays import Array, Flags
 from pam_envs.data.recording.channels import Channel
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
@@ -319,6 +319,10 @@ class SimulatorKind:
     def audit(self, recording: Recording, sheet: Rig) -> Audit:
         """Return the findings on a recording before its diagnosis."""
         return audit_channels(recording, sheet, self.plant.names)
+
+    def compared(self, measured: Array, family: Any, restart: Flags) -> Array:
+        """Return readings (channels, T) that are compared with a simulation: all."""
+        return measured
 
     def calibrate(
         self,

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from pam_envs.arrays import Array
+from pam_envs.arrays import Array, Flags
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import Audit, audit, unmet_needs
@@ -76,6 +76,10 @@ class MuscleKind:
     def audit(self, recording: Recording, sheet: Rig) -> Audit:
         """Return the findings on a recording before its diagnosis."""
         return audit(recording, sheet)
+
+    def compared(self, measured: Array, family: Any, restart: Flags) -> Array:
+        """Return readings (channels, T) that are compared with a simulation: all."""
+        return measured
 
     def calibrate(
         self,

@@ -54,7 +54,7 @@ class Calibration:
     family: MuscleFamily
     problem: Problem
     base: Candidate
-    guess: dict[str, float]  # starting values by parameter, of the base and its differences
+    guesses: Sequence[Mapping[str, float]]  # starting values, of the base and its differences
     rate: Form | None  # form of the limited rate that the pressure needs
     # whether a linear model may show that a difference is needed, without a refit
     linear: bool = True
@@ -128,7 +128,7 @@ def calibrate(
         tried = [guess, frees] if law else [guess]
     plain = family.column
     best = fit_base(problem, blocks, plain, tried, ROUNDS)
-    return Calibration(family, problem, best, found | law | wide, rate)
+    return Calibration(family, problem, best, (found | law | wide,), rate)
 
 
 def smoothed(pressure: Array, time: Array) -> Array:

@@ -110,7 +110,9 @@ def muscle_torque(
     at = lever.contraction(angle, muscle.rest_length) - straight
     ways = np.sign(lever.contraction(angle + 1e-3, muscle.rest_length) - straight - at)
     starts = np.where(at == 0.0, -1e-12 * ways, 0.0)
-    gains = muscle.gain * (1.0 + np.array([1.0, -1.0]) * muscle.imbalance)
+    sides = np.array([1.0, -1.0])
+    gains = muscle.gain * (1.0 + sides * muscle.imbalance)
+    rubs = 1.0 + sides * muscle.friction_imbalance
 
     def torque(phi: float, speed: float, pressures: Array) -> float:
         x, rate = lever.contraction(phi, muscle.rest_length), lever.rate(phi)
@@ -118,7 +120,7 @@ def muscle_torque(
             local_branch(friction.at_pressure(float(p)), float(a), float(start), branch, SIZE)(v)
             for p, a, start, v in zip(pressures, at, starts, x - straight, strict=True)
         ])  # fmt: skip
-        drag = friction.stiffness(pressures) * (x - straight - felt)
+        drag = rubs * friction.stiffness(pressures) * (x - straight - felt)
         slide = muscle.viscosity * pressures * -rate * speed / muscle.rest_length
         forces = gains * muscle.corrected(pressures, x) - drag - slide
         return float(-np.sum(np.maximum(0.0, forces) * rate))

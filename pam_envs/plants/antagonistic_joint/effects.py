@@ -155,6 +155,12 @@ def corrected_stiffness(fixed: Any, j: int, pressure: float, contraction: float)
 
 
 @kernel
+def uneven_rub(fixed: Any, j: int, side: float) -> float:
+    """Return the friction of a specimen over that of the hysteresis."""
+    return 1.0 + side * fixed[PAIR.uneven][j]
+
+
+@kernel
 def leaked_air(rows: Any, fixed: Any, j: int) -> float:
     """Return the air [kg] that leaked from all muscles of lane ``j`` in this control period."""
     leaked = 0.0
@@ -209,5 +215,5 @@ def pair_kernels(kind: str, layout: Any, pairs: int, effects: int | None) -> dic
     air = {"settle_air": settle_air, "begin_enclosed": begin_enclosed}
     air |= {"enclosed_stiffness": enclosed_stiffness, "leaked_air": leaked_air}
     air |= {"more_force": corrected_force, "more_stiffness": corrected_stiffness}
-    air |= {"peek_yield": peek_yield, "move_yield": move_yield}
+    air |= {"peek_yield": peek_yield, "move_yield": move_yield, "rub_of": uneven_rub}
     return found | shown | air | {"regulate": regulate_extended, "begin_muscles": begin}

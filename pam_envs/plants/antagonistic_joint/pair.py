@@ -54,7 +54,9 @@ def pair_rows(layout: Any, effects: int | None) -> Any:
         own = layout.STATE
         found |= {"effective": effects + own.effective, "paths": effects + own.paths}
         found |= {"deflection": effects + own.deflection, "yielded": effects + own.yielded}
-    found |= {name: getattr(layout.EFFECT, name) for name in ("path", "warm", "law", "soft")}
+    found |= {
+        name: getattr(layout.EFFECT, name) for name in ("path", "warm", "law", "soft", "uneven")
+    }
     return namedtuple("PairRows", tuple(found))(**found)
 
 
@@ -104,6 +106,12 @@ def more_force(fixed: Any, j: int, pressure: float, contraction: float) -> float
 def more_stiffness(fixed: Any, j: int, pressure: float, contraction: float) -> float:
     """Return minus the derivative of :func:`more_force` by contraction [N]."""
     return 0.0
+
+
+@kernel
+def rub_of(fixed: Any, j: int, side: float) -> float:
+    """Return the friction of a specimen over that of the hysteresis: 1 in a plain plant."""
+    return 1.0
 
 
 @kernel
@@ -272,7 +280,7 @@ def pulled(
     that of the law alone. A slack muscle has neither force nor stiffness.
     """
     area, passive, less, more = terms_of(fixed, j, contraction)
-    gain = gain_of(fixed, j, side)
+    gain, lag = gain_of(fixed, j, side), rub_of(fixed, j, side) * lag
     drag = friction_of(fixed, j, pressure) * lag + fixed[K.MUSCLE_VISCOSITY][j] * pressure * speed
     force = gain * (pressure * area - passive + more_force(fixed, j, pressure, contraction)) - drag
     slope = pressure * less + more + more_stiffness(fixed, j, pressure, contraction)
@@ -291,6 +299,8 @@ def pulled_twice(
     """
     area, passive, less, more = terms_of(fixed, j, contraction)
     gain, middle = gain_of(fixed, j, side), 0.5 * (was + pressure)
+    rub = rub_of(fixed, j, side)
+    lag, stick = rub * lag, rub * stick
     old = gain * (was * area - passive + more_force(fixed, j, was, contraction))
     old = old - friction_of(fixed, j, was) * lag
     new = gain * (pressure * area - passive + more_force(fixed, j, pressure, contraction))

@@ -38,6 +38,7 @@ globals().update(
             sensors=("angle", "pressure"),
             law="muscle",
             yields="muscle",
+            pair="muscle",
         ),
         {
             **each("effective deflection yielded", 2),

@@ -128,6 +128,7 @@ class PairPlant(Plant):
         """
         length, sides = self.muscle.rest_length, np.array(SIDES)
         gains = self.muscle.gain * (1.0 + sides * self.muscle.imbalance)
+        rubs = 1.0 + sides * self.muscle.friction_imbalance
         straight = self.lever.contraction(0.0, length)
         start = self.hysteresis.model.initial_state((cycles,))
 
@@ -138,7 +139,7 @@ class PairPlant(Plant):
         def force(p: Array, angle: Array, states: Any) -> tuple[Array, Any]:
             at, rate = self.lever.contraction(angle, length) - straight, self.lever.rate(angle)
             moved = [self.hysteresis.friction(at[:, k], p[k], states[k]) for k in range(2)]
-            drag = sum(moved[k][0] * rate[:, k] for k in range(2))
+            drag = sum(rubs[k] * moved[k][0] * rate[:, k] for k in range(2))
             return law(p, angle) + drag, tuple(after for _, after in moved)
 
         return ImposedMuscles(force, law, (start, start))

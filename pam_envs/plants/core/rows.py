@@ -45,18 +45,21 @@ def path_effects(
     sensors: tuple[str, ...],
     law: str | None = None,
     yields: str | None = None,
+    pair: str | None = None,
 ) -> dict[str, tuple[str, ...]]:
     """Return the names of the effects of muscle paths, a bearing, sensors and a law, by block.
 
     ``muscles`` are the components that have a temperature each (see ``core.muscle_path``), ``law``
-    is that with the correction of the static law, ``yields`` that with yielding friction.
+    is that with the correction of the static law, ``yields`` that with yielding friction, ``pair``
+    that of muscles in pairs, whose friction may differ.
     """
     rubs = {"bearing": dotted(**{bearing: " ".join(GUIDE._fields)})} if bearing else {}
     warm = {"warm": dotted(**dict.fromkeys(muscles, " ".join(WARM._fields)))}
     shown = {sensor: dotted(**{sensor: " ".join(SENSOR._fields)}) for sensor in sensors}
     maps = {"law": dotted(**{law: " ".join(FIELDS)})} if law else {}
     soft = {"soft": dotted(**{yields: " ".join(YIELD_FIELDS)})} if yields else {}
-    return {"path": PATH_NAMES} | warm | rubs | shown | maps | soft
+    uneven = {"uneven": dotted(**{pair: "friction_imbalance"})} if pair else {}
+    return {"path": PATH_NAMES} | warm | rubs | shown | maps | soft | uneven
 
 
 def layout(

@@ -48,15 +48,16 @@ def at_rest(
     if rig:
         angle = float(lever.angle(plant.fixture.length))
     else:
-        angle = lever.mount_angle + knee if leg else float(plant.angle_at(stiffness(pressure)))
+        free = float(plant.angle_at(stiffness(pressure), pressure))
+        angle = lever.mount_angle + knee if leg else free
     inertia = lever.inertia + (plant.leg.inertia if leg else 0.0)
     damping = lever.damping + (plant.leg.hold_damping if leg else 0.0)
     hold = plant.leg.hold_stiffness if leg else 0.0
 
     def tension_torque(state: Array) -> tuple[float, float]:
         theta = angle if rig else state[air]
-        pull = float(muscle.tension(stiffness(share @ state[:air]), lever.length(theta)))
-        pull = max(0.0, pull + rub(float(lever.length(theta))))
+        p, length = share @ state[:air], float(lever.length(theta))
+        pull = max(0.0, float(plant.pull(stiffness(p), p, length)) + rub(length))
         return pull, float(lever.torque(pull, theta))
 
     rub = _friction(plant, float(lever.length(angle)), pressure, branch)

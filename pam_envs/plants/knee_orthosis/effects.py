@@ -1,7 +1,8 @@
 """Effects of the knee orthosis: kernels that replace the placeholders.
 
 The muscle has the effects of its path (those of the air only behind the regulator's lag); the
-hysteresis turns the effective pressure into stiffness. The bearing of the brace without a leg
+hysteresis turns the effective pressure into stiffness, and a correction of the law depends on
+effective pressure and length. The bearing of the brace without a leg
 sticks and slips, and all sensors have their effects.
 """
 
@@ -12,6 +13,7 @@ from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, scratch
 from pam_envs.mechanics.knee_lever import muscle_length
 from pam_envs.muscle.gas_spring import gas_volume, stretch_of
+from pam_envs.muscle.law_correction import correction_force, correction_slope
 from pam_envs.plants.core.muscle_path import (
     PATH_STATE,
     begin_path,
@@ -136,6 +138,29 @@ def enclosed_stiffness(rows: Any, j: int) -> float:
 
 
 @kernel
+def full_length(fixed: Any, j: int) -> float:
+    """Return the length [m] of the muscle in the fully open brace, from which strains count."""
+    return 2.0 * fixed[K.LEVER_ARM][j] - fixed[K.LEVER_FITTINGS][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def corrected_tension(rows: Any, fixed: Any, j: int, length: float) -> float:
+    """Return the tension [N] of the law's correction at a length [m]."""
+    drive = rows[EFFECTS_AT + K.STATE.effective][j] + rows[EFFECTS_AT + K.STATE.beyond][j]
+    strain = 1.0 - length / full_length(fixed, j)
+    return correction_force(fixed, j, K.EFFECT.law, drive, strain)  # type: ignore[no-any-return]
+
+
+@kernel
+def corrected_stiffness(rows: Any, fixed: Any, j: int, length: float) -> float:
+    """Return the derivative of :func:`corrected_tension` by length [N/m]."""
+    drive = rows[EFFECTS_AT + K.STATE.effective][j] + rows[EFFECTS_AT + K.STATE.beyond][j]
+    full = full_length(fixed, j)
+    strain = 1.0 - length / full
+    return correction_slope(fixed, j, K.EFFECT.law, drive, strain) / full  # type: ignore[no-any-return]
+
+
+@kernel
 def leaked_air(rows: Any, fixed: Any, j: int) -> float:
     """Return the air [kg] that leaked from the muscle of lane ``j`` in this control period."""
     space = gas_volume(
@@ -208,4 +233,6 @@ def muscle_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
         "begin_enclosed": begin_enclosed,
         "enclosed_stiffness": enclosed_stiffness,
         "leaked_air": leaked_air,
+        "more_tension": corrected_tension,
+        "more_stiffness": corrected_stiffness,
     }

@@ -380,20 +380,32 @@ def move_length(
 
 
 @kernel
+def more_tension(rows: Any, fixed: Any, j: int, length: float) -> float:
+    """Return the tension [N] of the law's correction at a length [m]: a plain plant has none."""
+    return 0.0
+
+
+@kernel
+def more_stiffness(rows: Any, fixed: Any, j: int, length: float) -> float:
+    """Return the derivative of :func:`more_tension` by length [N/m]."""
+    return 0.0
+
+
+@kernel
 def torque_and_slope(
     rows: Any, fixed: Any, j: int, angle: float, stiffness: float
 ) -> tuple[float, float]:
     """Return the assistive torque [N m] at an angle [rad] and its slope [N m/rad]."""
     sine, cosine = sine_and_cosine(0.5 * angle)
     arm, spring = fixed[K.LEVER_ARM][j], fixed[K.LEVER_STIFFNESS][j]
-    stretch = stretch_of(
-        muscle_length(sine, arm, fixed[K.LEVER_FITTINGS][j]), fixed[K.MUSCLE_SHORTEST_LENGTH][j]
-    )
+    length = muscle_length(sine, arm, fixed[K.LEVER_FITTINGS][j])
+    stretch = stretch_of(length, fixed[K.MUSCLE_SHORTEST_LENGTH][j])
     rub = rows[K.RUB][j]
-    tension = max(0.0, spring_tension(stiffness, stretch) + rub * rows[K.LAG][j])
+    pull = spring_tension(stiffness, stretch) + more_tension(rows, fixed, j, length)
+    tension = max(0.0, pull + rub * rows[K.LAG][j])
     torque = assistive_torque(tension, cosine, angle, arm, spring, fixed[K.LEVER_RELAXED_ANGLE][j])
     pulls = max(0.0, stiffness) if stretch > 0.0 else 0.0
-    pulls = pulls + rub * rows[K.STICK][j]
+    pulls = pulls + more_stiffness(rows, fixed, j, length) + rub * rows[K.STICK][j]
     lever = arm * cosine
     return torque, spring + pulls * lever * lever - 0.5 * tension * arm * sine
 
@@ -596,7 +608,8 @@ def report_muscle(rows: Any, fixed: Any, j: int, length: float) -> None:
     stretch = stretch_of(length, fixed[K.MUSCLE_SHORTEST_LENGTH][j])
     rows[K.LENGTH][j] = length
     rub = rows[K.RUB][j] * rows[K.LAG][j]
-    rows[K.TENSION][j] = max(0.0, spring_tension(rows[K.STIFFNESS][j], stretch) + rub)
+    pull = spring_tension(rows[K.STIFFNESS][j], stretch) + more_tension(rows, fixed, j, length)
+    rows[K.TENSION][j] = max(0.0, pull + rub)
     space = gas_volume(
         length,
         fixed[K.MUSCLE_SHORTEST_LENGTH][j],

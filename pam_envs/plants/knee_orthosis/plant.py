@@ -253,13 +253,34 @@ class KneeOrthosis(Plant, rows=K):
         """Return the stiffness ``T / dL`` [N/m] of a tension [N] at an angle [rad]."""
         return self.muscle.stiffness(tension, self.lever.length(angle))
 
-    def angle_at(self, stiffness: ArrayLike) -> NDArray[np.float64]:
-        """Return the angle [rad] at which the brace rests without load at a stiffness [N/m]."""
+    def pull(
+        self, stiffness: ArrayLike, pressure: ArrayLike, length: ArrayLike
+    ) -> NDArray[np.float64]:
+        """Return the tension [N], not held above 0, with the correction of the law.
+
+        At a stiffness [N/m], a pressure [Pa] and a length [m] of the muscle.
+        """
+        tension = self.muscle.tension(stiffness, length)
+        if not self.muscle.corrects:
+            return tension
+        full = 2.0 * self.lever.arm - self.lever.fittings
+        return tension + self.muscle.correction(pressure, 1.0 - np.asarray(length) / full)
+
+    def angle_at(
+        self, stiffness: ArrayLike, pressure: ArrayLike | None = None
+    ) -> NDArray[np.float64]:
+        """Return the angle [rad] at which the brace rests without load at a stiffness [N/m].
+
+        With the correction of the law if the pressure [Pa] is given.
+        """
         s = np.asarray(stiffness, float)
         low, high = np.zeros_like(s), np.full_like(s, np.pi)
         for _ in range(60):
             middle = 0.5 * (low + high)
-            tension = self.muscle.tension(s, self.lever.length(middle))
+            length = self.lever.length(middle)
+            tension = self.muscle.tension(s, length)
+            if pressure is not None:
+                tension = np.maximum(0.0, self.pull(s, pressure, length))
             opens = self.lever.torque(tension, middle) < 0.0
             low, high = np.where(opens, middle, low), np.where(opens, high, middle)
         return 0.5 * (low + high)

@@ -29,7 +29,13 @@ globals().update(
         | each("payload slack air straight share")
         | {"delay": 2 * MOST_STAGES * DELAYED.end},
         (*STAGE, *dotted(arm="mass_factor damping_factor")),
-        path_effects("muscle", sensors=("angle", "pressure"), law="muscle", yields="muscle"),
+        path_effects(
+            "muscle",
+            sensors=("angle", "pressure"),
+            law="muscle",
+            yields="muscle",
+            pair="muscle",
+        ),
         {
             **each("effective deflection yielded", 2 * MOST_STAGES),
             "paths": 2 * MOST_STAGES * PATH_STATE.end,

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -113,3 +114,12 @@ def test_wrong_name_folder_or_plant_is_refused(make, message, tmp_path):
 def test_citation_consists_of_keys_of_references(name):
     for key in filter(None, CONTROLLERS[name].citation.split("; ")):
         assert key in citations.entries()
+
+
+def test_missing_package_of_a_design_names_the_extra(monkeypatch):
+    def make(spec):
+        raise ModuleNotFoundError("No module named 'slycot'", name="slycot")
+
+    monkeypatch.setitem(CONTROLLERS, "pid", replace(CONTROLLERS["pid"], make=make))
+    with pytest.raises(ModuleNotFoundError, match=r"pid needs slycot.*\[synthesis\]"):
+        built("pid", make_env("PAM/MusclePositioning-v0"))
