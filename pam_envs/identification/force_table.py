@@ -14,6 +14,8 @@ from pam_envs.parameters import declarations
 FITTED = ("area", "area_taper", "braid_force", "braid_strain", "stiffness", "hardening")
 STRAINS = (0.006, 0.015, 0.03, 0.06, 0.12)
 """Starting values of the strain over which the force of the braid rises."""
+SAME = 1e-4
+"""Relative difference of two sums of squares that counts as none."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +65,9 @@ def fit_law(table: ForceTable, muscle: EffectiveAreaMuscle) -> LawFit:
         found.append(
             least_squares(errors, begin / scale, bounds=(low / scale, high / scale), x_scale=1.0)
         )
-    best = min(found, key=lambda fit: float(fit.cost))
+    least = min(float(fit.cost) for fit in found)
+    # with few lengths several laws fit alike: the first of them, on every processor
+    best = next(fit for fit in found if fit.cost <= (1.0 + SAME) * least)
     values = np.clip(best.x * scale, low, high)
     values = np.where(best.active_mask < 0, low, np.where(best.active_mask > 0, high, values))
     at_bound = tuple(n for n, active in zip(FITTED, best.active_mask, strict=True) if active)
