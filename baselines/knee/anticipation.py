@@ -225,7 +225,7 @@ class KneeAnticipation(RowController):
         ends = arrival.delay[:, None] + ENDS
         planned = self._ahead(now, ends)
         angle, response = self._angles_ahead(view, observation, now, arrival, ends, planned[0])
-        demand = self._demand(view, observation, now, ends, planned, more)
+        demand = self._demand(view, now, ends, planned, more)
         stiffness, weight = self._stiffness(demand, angle), self._weight(demand, angle)
         path = (inverse or partial(self._inverse, now.moments))(stiffness, later)
         reach = (arrival.rate * self.bank.period)[:, None] * np.array(BLOCKS, float)
@@ -336,7 +336,7 @@ class KneeAnticipation(RowController):
         products = np.stack([off, sensed], axis=1) * off[:, None]
         yielding = now.yielding + np.where(phase[..., None], products[:, None], 0.0)
         yielding[..., 1] = np.clip(yielding[..., 1], 0.5 * yielding[..., 0], 2.0 * yielding[..., 0])
-        ratio = yielding[..., 1] / yielding[..., 0]
+        ratio = _yielded(yielding)
         scaled = np.where(view.stance, ratio[:, 1], ratio[:, 0]) * off
         differs = view.angle - path[:, 1] - scaled
         differs = now.wearer[:, 2] + FILTERED * (differs - now.wearer[:, 2])
@@ -372,7 +372,7 @@ class KneeAnticipation(RowController):
         torque = torque + self._leg.passive(path)[:, :last]
         load = self._loads_ahead(observation, now, np.arange(last) + 0.5)
         course = self._leg.along(now.wearer[:, :2], torque, load)[..., 0]
-        ratio = now.yielding[..., 1] / now.yielding[..., 0]
+        ratio = _yielded(now.yielding)
         scale = np.where(stance[:, 1:-1], ratio[:, 1:], ratio[:, :1])
         response = self._leg.response(load, scale, ends, arrival.delay)
         course = course * scale
@@ -408,8 +408,8 @@ class KneeAnticipation(RowController):
         given = self.torque.rows(observation)[0][:, None, None]
         off = (given - SCALES[:, None] * torque[:, None]) / TORQUE_NOISE
         path = ((view.angle_reference[:, None] - angle) / ANGLE_NOISE)[:, None]
-        ratio = now.yielding[:, 1, 1] / now.yielding[:, 1, 0]  # deviation of the last period
-        held = (view.angle - ratio * now.wearer[:, 0])[:, None] - angle
+        pushed = _yielded(now.yielding)[:, 1] * now.wearer[:, 0]  # in the last period
+        held = (view.angle - pushed)[:, None] - angle
         held = (held / STANCE_NOISE)[:, None]
         fit = np.exp(-0.5 * np.where(stance[..., None], off**2 + held**2, path**2))
         sure = np.where(stance, MISMATCH, MISMATCH * fit[:, 0])[:, None]
@@ -417,8 +417,8 @@ class KneeAnticipation(RowController):
         return np.where(((planned | (stance & slack)) == stance)[:, None], fit, sure)
 
     def _demand(
-        self, view: KneeView, observation: ArrayLike, now: AnticipationState, ends: Array,
-        planned: tuple[Array, Rows], more: Correction | None,
+        self, view: KneeView, now: AnticipationState, ends: Array, planned: tuple[Array, Rows],
+        more: Correction | None,
     ) -> Demand:  # fmt: skip
         """Return what is demanded at the nodes.
 
@@ -554,6 +554,11 @@ class KneeAnticipation(RowController):
 def _point(now: AnticipationState) -> Array:
     """Return the wearer's point in the nominal stride [control periods], shape (n_env,)."""
     return np.asarray(now.place + now.plan.shift)
+
+
+def _yielded(yielding: Array) -> Array:
+    """Return the sensed deviation over the nominal one [1], in swing and in stance, (n_env, 2)."""
+    return np.asarray(yielding[..., 1] / yielding[..., 0])
 
 
 def _planned_torque(now: AnticipationState, ends: Array, times: Array) -> Array:

@@ -44,6 +44,11 @@ class KneeLever(BearingEffects):
     inertia: float = assumed(0.02, "kg m2", 1e-3, 0.5, "half a brace of 0.8 kg about the knee")
     damping: float = assumed(1.0, "N m s/rad", 0.05, 50.0, "brace and muscle: damping ratio 0.5")
 
+    @property
+    def full_length(self) -> float:
+        """Length of the muscle in the fully open brace [m], from which its strain counts."""
+        return 2.0 * self.arm - self.fittings
+
     def length(self, angle: ArrayLike) -> NDArray[np.float64]:
         """Return the muscle's length ``L`` [m] at an angle [rad], Eq. (4)."""
         return np.asarray(2.0 * self.arm * np.sin(0.5 * np.asarray(angle)) - self.fittings)

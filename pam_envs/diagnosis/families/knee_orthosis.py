@@ -114,10 +114,9 @@ class BoundKnee(RegulatedFamily):
         """Return groups of pressures [Pa] and strains of the muscle, (2, k)."""
         lever, place = self.plant.lever, self.channels.index
         angle, pressure = measured[place("angle")], measured[place("pressure")]
-        full = 2.0 * lever.arm - lever.fittings
         if self.plant.mounting != MOVING:
             angle = np.full(len(pressure), float(lever.angle(self.plant.fixture.length)))
-        return grouped(1.0 - lever.length(angle) / full, pressure, slack=False)
+        return grouped(1.0 - lever.length(angle) / lever.full_length, pressure, slack=False)
 
     def law_slopes(self, columns: Array, pressure: Array, strain: Array) -> tuple[Array, ...]:
         """Return slopes of the laws of columns (n, p), without correction, at states (k,)."""
@@ -125,8 +124,7 @@ class BoundKnee(RegulatedFamily):
         def value(name: str) -> Array:
             return columns[:, [self.plant.names.index(f"muscle.{name}")]]
 
-        lever = self.plant.lever
-        full = 2.0 * lever.arm - lever.fittings
+        full = self.plant.lever.full_length
         slope = value("gain")
         if self.plant.hysteresis.drive == "length":
             slope = slope * value("stiffness_ratio")

@@ -263,8 +263,8 @@ class KneeOrthosis(Plant, rows=K):
         tension = self.muscle.tension(stiffness, length)
         if not self.muscle.corrects:
             return tension
-        full = 2.0 * self.lever.arm - self.lever.fittings
-        return tension + self.muscle.correction(pressure, 1.0 - np.asarray(length) / full)
+        strain = 1.0 - np.asarray(length) / self.lever.full_length
+        return tension + self.muscle.correction(pressure, strain)
 
     def angle_at(
         self, stiffness: ArrayLike, pressure: ArrayLike | None = None
@@ -278,8 +278,9 @@ class KneeOrthosis(Plant, rows=K):
         for _ in range(60):
             middle = 0.5 * (low + high)
             length = self.lever.length(middle)
-            tension = self.muscle.tension(s, length)
-            if pressure is not None:
+            if pressure is None:
+                tension = self.muscle.tension(s, length)
+            else:
                 tension = np.maximum(0.0, self.pull(s, pressure, length))
             opens = self.lever.torque(tension, middle) < 0.0
             low, high = np.where(opens, middle, low), np.where(opens, high, middle)
