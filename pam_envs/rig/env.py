@@ -176,6 +176,8 @@ class RealTimeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         ------
         ResetNeeded
             If no episode is running.
+        OSError
+            If the rig does not accept setpoints.
         """
         if not self._running:
             raise gym.error.ResetNeeded("no episode is running on the rig; call reset()")
@@ -279,10 +281,18 @@ class RealTimeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self.driver.stop()
 
     def close(self) -> None:
-        """Vent the muscles, disconnect, and close the log."""
-        self._halt()
-        if self._open:
-            self.driver.close()
-            self._open = False
-        if self.log is not None:
-            self.log.close()
+        """Vent the muscles, disconnect, and close the log, also if the device does not answer.
+
+        Raises
+        ------
+        OSError
+            If the muscles cannot be vented.
+        """
+        try:
+            self._halt()
+        finally:
+            if self._open:
+                self.driver.close()
+                self._open = False
+            if self.log is not None:
+                self.log.close()

@@ -145,9 +145,21 @@ class ModbusDriver:
         self._write(self.watchdog, self._beat)
 
     def stop(self) -> None:
-        """Set all outputs to 0 counts."""
-        for channel in self.outputs.values():
-            self._write(channel.register, 0)
+        """Set all outputs to 0 counts, the remaining ones also if one of them fails.
+
+        Raises
+        ------
+        OSError
+            If an output is not set.
+        """
+        faults = []
+        for name, channel in self.outputs.items():
+            try:
+                self._write(channel.register, 0)
+            except OSError as error:
+                faults.append(f"{name} is not vented: {error}")
+        if faults:
+            raise OSError(f"{'; '.join(faults)}; only the watchdog of the device vents it")
 
     def close(self) -> None:
         """Disconnect."""

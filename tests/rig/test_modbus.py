@@ -1,50 +1,20 @@
 """Modbus driver against a pymodbus server on this machine."""
 
-import asyncio
-import socket
-import threading
-
 import pytest
 
 pytest.importorskip("pymodbus")
-from pymodbus.server import ModbusTcpServer
-from pymodbus.simulator import DataType, SimData, SimDevice
-
 from pam_envs.rig.modbus import Channel, ModbusDriver
 from sweeps.limits import scaled
+from tests.rig.register_bank import INPUTS, OUTPUTS, device, serving
 
-INPUTS = {"pressure": Channel(0, 0.0, 1e6), "contraction": Channel(1, -0.01, 0.04)}
-OUTPUTS = {"pressure_set_point": Channel(0, 0.0, 1e6)}
 NUMBERS = [8294, 65536 - 100]
 
 
 @pytest.fixture
 def port():
     """Serve two input registers and 20 holding registers; return the port."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        number = free.getsockname()[1]
-    loop, started = asyncio.new_event_loop(), threading.Event()
-    servers = []
-
-    async def serve():
-        blank = SimData(0, values=[False] * 16, datatype=DataType.BITS)
-        inputs = SimData(0, values=NUMBERS, datatype=DataType.REGISTERS)
-        holding = SimData(0, values=[0] * 20, datatype=DataType.REGISTERS)
-        device = SimDevice(1, simdata=([blank], [blank], [holding], [inputs]))
-        servers.append(ModbusTcpServer(device, address=("127.0.0.1", number)))
-        task = asyncio.ensure_future(servers[0].serve_forever(background=True))
-        await task
-        started.set()
-
-    thread = threading.Thread(target=loop.run_forever)
-    thread.start()
-    asyncio.run_coroutine_threadsafe(serve(), loop).result(scaled(30.0))
-    yield number
-    asyncio.run_coroutine_threadsafe(servers[0].shutdown(), loop).result(scaled(30.0))
-    loop.call_soon_threadsafe(loop.stop)
-    thread.join()
-    loop.close()
+    with serving(device(NUMBERS)) as number:
+        yield number
 
 
 def test_registers_are_read_and_written_in_si(port):
