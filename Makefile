@@ -41,6 +41,7 @@ venv: $(READY) ## Make .venv with everything
 benchmark: $(READY) ## Score every controller and write the leaderboard
 	$(BIN)/python -m benchmarks run
 	$(BIN)/python -m benchmarks board
+	$(BIN)/python -m benchmarks cards
 
 test: $(READY) ## Run the tests: a part without the compiler, then all
 ifneq ($(PLAIN),)
@@ -81,7 +82,7 @@ licences: $(READY) ## Write the licences of the pinned packages into docs/licenc
 	$(BIN)/python docs/make_licences.py
 
 images: $(READY) ## Draw the pictures of the documentation
-	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --reference staircase --load 2.55 --episode-seconds 40 --plot docs/images/muscle_positioning.png
+	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --reference staircase --load 2.55 --episode-seconds 40 --title "Inverse of the hysteresis with PID, load 2.55 kg" --plot docs/images/muscle_positioning.png
 	$(BIN)/python docs/make_images.py
 	$(BIN)/pam-envs render KneeWalk --seconds 5 --fps 10 --video docs/images/knee_walk.gif
 

@@ -152,6 +152,19 @@ def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
     return 0
 
 
+def cards(results: Path = rows.RESULTS) -> int:
+    """Write the model cards of the policies in agents/pretrained.
+
+    Args:
+        results: Folder of the rows.
+    """
+    from benchmarks.board import model_cards
+
+    for path in model_cards.write(results):
+        print(path)
+    return 0
+
+
 def gap(results: Path = rows.RESULTS) -> int:
     """Print the distance of the best classical controllers from the oracle (leaderboard/gap.md).
 
@@ -521,6 +534,7 @@ def show(
     controller: str,
     seed: int = 101,
     plot: Path | None = None,
+    title: str = "",
     video: Path | None = None,
     arguments: Annotated[Arguments, arg(name="")] = Arguments(),
 ) -> int:
@@ -531,6 +545,7 @@ def show(
         controller: Name of a controller.
         seed: Seed of the reset.
         plot: Image file to write.
+        title: Title of the image; default: controller, environment, arguments and seed.
         video: Video file to write.
     """
     from benchmarks.runs import show as showing
@@ -547,8 +562,8 @@ def show(
             print(line)
     if plot:
         said = "".join(f", {name} {value}" for name, value in kwargs.items())
-        title = f"{controller} in {env_id}{said}, seed {seed}"
-        figure = showing.episode_figure(episode.signals, set_points, title, shown(content))
+        words = title or f"{controller} in {env_id}{said}, seed {seed}"
+        figure = showing.episode_figure(episode.signals, set_points, words, shown(content))
         plot.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(plot, dpi=150)
         print(plot)
@@ -704,6 +719,7 @@ def dataset(
 COMMANDS: dict[str, Callable[..., int]] = {
     "run": run,
     "board": board,
+    "cards": cards,
     "gap": gap,
     "site": site,
     "film": film,

@@ -77,12 +77,12 @@ if __name__ == "__main__":
     frame("PAM/KneeTension-v0", images / "knee_tension_frame.png", 14.0, start="paper")
     frame("PAM/KneeWalk-v0", images / "knee_walk_frame.png", 10.6, start="heel_contact")
     elbow = images / "elbow_orthosis_frame.png"
-    frame("PAM/ElbowOrthosis-v0", elbow, 6.6, reference="weight", motion="sines")
+    frame("PAM/ElbowOrthosis-v0", elbow, 9.4, reference="weight", motion="sines")
     papers_elbow.bundle_figure().savefig(images / "elbow_bundles.png", dpi=100)
     joint = images / "antagonistic_joint_frame.png"
     frame("PAM/AntagonisticJoint-v0", joint, 8.9, reference="sine", payload=0.5, disturbance=1.5)
     arm = images / "redundant_manipulator_frame.png"
-    frame("PAM/RedundantManipulator-v0", arm, 4.2, reference="path_3")
+    frame("PAM/RedundantManipulator-v0", arm, 23.2, reference="path_3")
     stride(images / "knee_stride.png")
     isobaric_figure().savefig(images / "isobaric_loops.png", dpi=90)
     pareto_figure().savefig(images / "effort_pareto.png", dpi=100)

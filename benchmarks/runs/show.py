@@ -115,17 +115,16 @@ def episode_figure(
 
 
 def _draw_inputs(axes: Any, signals: Mapping[str, Any], set_points: Mapping[str, Any]) -> None:
-    """Draw setpoints, and of a single muscle its pressure and drive."""
+    """Draw setpoints, and of a single muscle its pressure."""
     angles = all(name.startswith("angle") for name in set_points)
     unit, factor = ("deg", np.rad2deg(1.0)) if angles else ("bar", 1e-5)
     single = {"color": "0.6"} if len(set_points) == 1 else {}
     for name, asked in set_points.items():
         label = "setpoint" if single else name.replace("_set_point", "")
         axes.plot(signals["time"], factor * asked, linewidth=0.8, label=label, **single)
-    for name, color, width in (("pressure", "#009e73", 1.5), ("drive", "#cc79a7", 0.8)):
-        if f"state/{name}" in signals:
-            pressure = 1e-5 * signals[f"state/{name}"]
-            axes.plot(signals["time"], pressure, color=color, linewidth=width, label=name)
+    if "state/pressure" in signals:
+        pressure = 1e-5 * signals["state/pressure"]
+        axes.plot(signals["time"], pressure, color="#009e73", linewidth=1.5, label="pressure")
     axes.set_ylabel(f"{'angle' if angles else 'pressure'} [{unit}]")
     axes.set_xlabel("time [s]")
     axes.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))

@@ -58,7 +58,7 @@ def _arc(canvas: S.Canvas, torque: float) -> None:
     head = [turned(span, 0.0, radius)]
     head += [turned(root, 0.0, radius + way * abs(side)) for way in (1.0, -1.0)]
     canvas.polygon(head, S.HOT)
-    canvas.text(f"{torque:+.1f} N m", (PIVOT[0], 458), S.HOT, 12, "center")
+    canvas.text(f"{S.signed(torque, 1)} N m", (PIVOT[0], 458), S.HOT, 12, "center")
 
 
 def _scale(canvas: S.Canvas, largest: float) -> None:

@@ -49,7 +49,7 @@ class Camera:
         return Camera(self.azimuth, self.elevation, scale, (across, down))
 
 
-BOX = (26.0, 40.0, 262.0, 428.0)
+BOX = (26.0, 40.0, 238.0, 428.0)
 """Area of the arm in the picture: left, top, width, height [pixels]."""
 SCENE = (0, 0, 330, 600)
 PLATE = ((-0.15, -0.15), (0.15, -0.15), (0.15, 0.15), (-0.15, 0.15))
@@ -140,7 +140,7 @@ def arm_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
         _arm(canvas, camera, plant, info)
         canvas.line(camera.line(path[:3].T), S.REFERENCE, 2.5)
         _tool(canvas, camera, info)
-    S.pressure_scale(canvas, _mean_pressure(info), plant.regulator.max_pressure, 284.0, 120.0)
+    S.pressure_scale(canvas, _mean_pressure(info), plant.regulator.max_pressure, 276.0, 120.0)
     _numbers(canvas, plant, info)
 
 
@@ -171,26 +171,18 @@ def _plan_view(canvas: S.Canvas, env: Any, info: Any, points: S.Trace) -> None:
     """Draw reference path and path of the tip in the plane in which the reference is longest."""
     path, tips = _upright(path_of(env, info)[:3]), _upright(np.array(points).T)
     seen = sorted(np.argsort(np.ptp(path, axis=1))[1:].tolist())
-    middle = 0.5 * (path.max(axis=1) + path.min(axis=1))
+    both = np.hstack([path, tips])
+    middle = 0.5 * (both.max(axis=1) + both.min(axis=1))
     ratio = S.PANEL[2] / S.PANEL[3]
-    tall = 1.3 * max(np.ptp(path[seen[1]]), np.ptp(path[seen[0]]) / ratio, 0.02)
+    tall = 1.15 * max(np.ptp(both[seen[1]]), np.ptp(both[seen[0]]) / ratio, 0.02)
     sides = (0.5 * tall * ratio, 0.5 * tall)
     spans = [(middle[k] - half, middle[k] + half) for k, half in zip(seen, sides, strict=True)]
     axes = S.Axes(canvas, S.PANEL, *spans)
     across, up = (f"{('x', 'y', 'height')[k]} [m]" for k in seen)
-    axes.frame(_round_ticks(*spans[0]), _round_ticks(*spans[1]), across, up)
-    canvas.line([axes.at(*point) for point in path[seen].T], S.REFERENCE, 2)
-    ways = [axes.at(*point) for point in tips[seen].T]
-    canvas.line(ways, S.OUTPUT, 2)
-    canvas.disc(ways[-1], 4.5, S.OUTPUT)
-
-
-def _round_ticks(low: float, high: float) -> list[float]:
-    """Return up to seven round numbers between two."""
-    least = (high - low) / 7.0
-    power = 10.0 ** math.floor(math.log10(least))
-    step = next(n * power for n in (1.0, 2.0, 5.0, 10.0) if n * power >= least)
-    return [round(k * step, 6) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    axes.frame(S.round_ticks(*spans[0]), S.round_ticks(*spans[1]), across, up)
+    axes.curve(path[seen].T.tolist(), S.REFERENCE, 2)
+    axes.curve(tips[seen].T.tolist(), S.OUTPUT, 2)
+    canvas.disc(axes.at(*tips[seen, -1]), 4.5, S.OUTPUT)
 
 
 OFF_PATH = S.Strip(

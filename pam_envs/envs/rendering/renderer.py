@@ -156,9 +156,10 @@ class Renderer:
             scene.pressure_loop(self.canvas, self.env.plant, first, points)
         else:
             self.view.panel(self.canvas, self.env, self.info, points)
-        start = max(0.0, self.strip[-1][0] - STRIP_SECONDS)
+        shown = min(STRIP_SECONDS, self.env.setup.episode_seconds)
+        start = max(0.0, self.strip[-1][0] - shown)
         for strip in self.view.strips:
-            self._draw_strip(strip, (start, start + STRIP_SECONDS))
+            self._draw_strip(strip, (start, start + shown))
         self.canvas.text("reference", (712, first.top - 21), scene.REFERENCE, 12, "right")
         self.canvas.text("output", (770, first.top - 21), scene.OUTPUT, 12, "right")
         return self.canvas.picture()
@@ -169,7 +170,7 @@ class Renderer:
         name, unit, number = self.view.number
         for x, title, value, color in (
             (360, "time", f"{info['time']:.2f} s", scene.INK),
-            (475, "error", f"{error:+.2f} {first.unit}", scene.INK),
+            (475, "error", f"{scene.signed(error, 2)} {first.unit}", scene.INK),
             (600, name, f"{number(info):.2f} {unit}", self.view.number_color),
         ):
             text(title, (x, 14), scene.MUTED, 11)
@@ -181,13 +182,14 @@ class Renderer:
     def _draw_strip(self, strip: scene.Strip, seconds: scene.Point) -> None:
         """Draw one plot of the last seconds; the lowest one has the time axis."""
         lowest, (span, across, name) = strip is self.view.strips[-1], strip.axis(self.env.plant)
-        whole = range(2 * math.ceil(0.5 * seconds[0]), math.floor(seconds[1]) + 1, 2)
         axes = scene.Axes(self.canvas, (360, strip.top, 410, strip.height), seconds, span)
-        axes.frame(whole, across, "time [s]" if lowest else "", name, numbers=lowest)
+        axes.frame(
+            scene.round_ticks(*seconds), across, "time [s]" if lowest else "", name, numbers=lowest
+        )
         for key, color, width in strip.lines:
             k = self._keys.index(key)
-            points = [axes.at(past[0], strip.scale * past[k]) for past in self.strip]
-            self.canvas.line(points, color, width)
+            points = [(past[0], strip.scale * past[k]) for past in self.strip]
+            axes.curve(points, color, width)
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the picture, shape (600, 800, 3)."""

@@ -25,6 +25,20 @@ LINES = (("reference", REFERENCE, 1.5), ("output", OUTPUT, 2.0))
 """Lines of the strip of output and reference."""
 
 
+def signed(value: float, digits: int) -> str:
+    """Return a number with its sign; one that rounds to zero has none."""
+    text = f"{value:+.{digits}f}"
+    return text if float(text) else text[1:]
+
+
+def round_ticks(low: float, high: float) -> list[float]:
+    """Return up to eight round numbers from ``low`` to ``high``."""
+    least = (high - low) / 7.0
+    power = 10.0 ** math.floor(math.log10(least))
+    step = next(n * power for n in (1.0, 2.0, 5.0, 10.0) if n * power >= least)
+    return [round(k * step, 6) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
+
+
 def blend(a: Color, b: Color, share: float) -> Color:
     """Return the mixture of two colours with ``share`` of ``b``."""
     s = min(1.0, max(0.0, share))
@@ -114,17 +128,19 @@ def pressure_strip(
 
 SCALE_HEIGHT = 120.0
 """Height of the colour scale of pressures [pixels]."""
+FAR = 10.0
+"""Distance at which the points of a curve are cut off, in boxes of its plot."""
 PANEL: Box = (360, 88, 410, 200)  # position and size of the plot above the strips
 
 
 def draw_loop(canvas: Canvas, points: Trace, axes: Axes, scale: float = 1.0) -> None:
     """Draw a path of points whose second coordinate is SI: pale where old, a disc at the end."""
-    places, step = [axes.at(x, scale * y) for x, y in points], 12
+    places, step = [(x, scale * y) for x, y in points], 12
     for i in range(0, len(places) - 1, step):
         age = i / len(places)
-        canvas.line(places[i : i + step + 1], blend(GRID, OUTPUT, 0.15 + 0.85 * age), 2)
+        axes.curve(places[i : i + step + 1], blend(GRID, OUTPUT, 0.15 + 0.85 * age), 2)
     if places:
-        canvas.disc(places[-1], 4.5, OUTPUT)
+        canvas.disc(axes.at(*places[-1]), 4.5, OUTPUT)
 
 
 def pressure_loop(
@@ -147,9 +163,21 @@ class Axes:
 
     def at(self, x: float, y: float) -> Point:
         """Return the position of a point [pixels]; a point outside is moved to the edge."""
+        return self._place(x, y, 0.0)
+
+    def curve(self, points: Iterable[Point], color: Color, width: float) -> None:
+        """Draw a line through points; what is outside the box is not drawn."""
+        left, top, wide, high = self.box
+        margin = math.ceil(0.5 * width)
+        box = (left - margin, top - margin, wide + 2 * margin, high + 2 * margin)
+        with self.canvas.within(box):
+            self.canvas.line([self._place(x, y, FAR) for x, y in points], color, width)
+
+    def _place(self, x: float, y: float, far: float) -> Point:
+        """Return a position [pixels], at most ``far`` boxes outside the box."""
         left, top, width, height = self.box
-        across = min(1.0, max(0.0, (x - self.x[0]) / (self.x[1] - self.x[0])))
-        up = min(1.0, max(0.0, (y - self.y[0]) / (self.y[1] - self.y[0])))
+        across = min(1.0 + far, max(-far, (x - self.x[0]) / (self.x[1] - self.x[0])))
+        up = min(1.0 + far, max(-far, (y - self.y[0]) / (self.y[1] - self.y[0])))
         return left + across * width, top + (1.0 - up) * height
 
     def frame(
@@ -230,7 +258,7 @@ def torque_bars(
             tip = math.copysign(5.0, torque)
             canvas.polygon([(end, y), (end + tip, y + 6), (end, y + 12)], color)
         canvas.line([(zero, y - 3), (zero, y + 15)], MUTED, 1)
-        canvas.text(f"{torque:+.1f}", (314, y - 1), color, 11, "right")
+        canvas.text(signed(torque, 1), (314, y - 1), color, 11, "right")
     canvas.text(note, (314, 574), MUTED, 11, "right")
 
 

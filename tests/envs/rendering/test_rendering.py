@@ -12,6 +12,9 @@ import pytest
 from tests.envs.cases import IDS, actions_for
 
 pytest.importorskip("pygame")
+from pam_envs.envs.rendering.renderer import Canvas
+from pam_envs.envs.rendering.scene import INK, PRESSURE, Axes, round_ticks, signed
+
 EVERY = pytest.mark.parametrize("name", IDS)
 
 
@@ -179,3 +182,52 @@ def test_torque_beyond_the_scale_has_a_tip() -> None:
         picture = canvas.pygame.surfarray.array3d(canvas.picture())
         pictures.append([np.any(picture[x, 100:112] == scene.INK[0]) for x in (117, 274)])
     assert pictures == [[False, False], [False, True], [True, False]]
+
+
+def test_number_that_rounds_to_zero_has_no_sign() -> None:
+    assert [signed(v, 2) for v in (-0.004, 0.004, -0.006, 12.0)] == [
+        "0.00",
+        "0.00",
+        "-0.01",
+        "+12.00",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "ticks"),
+    [
+        (0.0, 8.0, [0.0, 2.0, 4.0, 6.0, 8.0]),
+        (0.0, 5.0, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]),
+        (3.5, 11.5, [4.0, 6.0, 8.0, 10.0]),
+        (0.0, 0.5, [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]),
+    ],
+)
+def test_ticks_are_round(low: float, high: float, ticks: list[float]) -> None:
+    assert round_ticks(low, high) == ticks
+
+
+def test_curve_outside_its_plot_is_cut_off() -> None:
+    canvas = Canvas()
+    canvas.clear()
+    box = (100, 100, 200, 100)
+    Axes(canvas, box, (0.0, 1.0), (0.0, 1.0)).curve([(0.0, 0.5), (0.5, 1e9), (2.0, 0.5)], INK, 2)
+    drawn = np.argwhere(canvas.pygame.surfarray.array3d(canvas.picture())[..., 0] < 200)
+    assert len(drawn) > 50
+    assert drawn.min(axis=0).tolist() >= [98, 98]
+    assert drawn[:, 0].max() < 302
+    along_edge = (drawn[:, 1] < 103).sum()
+    assert along_edge < 20
+
+
+@pytest.mark.parametrize(("seconds", "share"), [(5.0, 1.0), (20.0, 0.625)])
+def test_time_axis_is_not_longer_than_the_episode(seconds: float, share: float) -> None:
+    env = gym.make("PAM/KneeWalk-v0", render_mode="rgb_array", episode_seconds=seconds).unwrapped
+    env.reset(seed=0)
+    for _ in range(round(5.0 / env.control_period)):
+        env.step(np.zeros(env.action_space.shape, np.float32))
+    picture = env.render()
+    left, top, width, height = 360, 524, 410, 36  # the pressure strip
+    green = np.all(np.abs(picture[top : top + height].astype(int) - PRESSURE) < 40, axis=2)
+    reached = np.flatnonzero(green.any(axis=0)).max()
+    assert reached == pytest.approx(left + share * width, abs=3)
+    env.close()
