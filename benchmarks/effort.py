@@ -114,7 +114,7 @@ def pareto_figure() -> Any:
         ax.plot(*zip(*best, strict=True), color="C0", linewidth=0.8)
         ax.axhline(1.0, color="0.3", linewidth=0.8, linestyle=":")
         ax.set_xscale("log")
-        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
         ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.margins(x=0.2, y=0.25)

@@ -49,7 +49,7 @@ class Camera:
         return Camera(self.azimuth, self.elevation, scale, (across, down))
 
 
-BOX = (26.0, 40.0, 238.0, 428.0)
+BOX = (12.0, 40.0, 246.0, 440.0)
 """Area of the arm in the picture: left, top, width, height [pixels]."""
 SCENE = (0, 0, 330, 600)
 PLATE = ((-0.15, -0.15), (0.15, -0.15), (0.15, 0.15), (-0.15, 0.15))
@@ -74,13 +74,22 @@ def _camera(plant: Any, path: NDArray[np.float64]) -> tuple[Camera, float]:
     arms = plant.chain.joints(path[6:, ::10].T).reshape(-1, 3)
     base = np.array([[x, y, 0.0] for x in (-0.2, 0.2) for y in (-0.2, 0.2)])
     shadows = np.column_stack([arms[:, :2], np.full(len(arms), floor)])
-    return CAMERA.fitted(np.vstack([arms, base, shadows]), BOX), floor
+    (left, near), (right, far) = _floor(path)
+    corners = [(x, y, floor) for x in (left, right) for y in (near, far)]
+    return CAMERA.fitted(np.vstack([arms, base, shadows, corners]), BOX), floor
 
 
-def _grid(canvas: S.Canvas, camera: Camera, points: NDArray[np.float64], depth: float) -> None:
-    """Draw squares of 0.2 m on the floor, as far as the points reach."""
+def _floor(path: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lowest and the highest x and y [m] of the squares below a path and the base."""
+    points = np.vstack([path[:2].T, np.zeros((1, 2))])
     low = np.floor(points.min(axis=0) / 0.2 - 0.5) * 0.2
     high = np.ceil(points.max(axis=0) / 0.2 + 0.5) * 0.2
+    return low, high
+
+
+def _grid(canvas: S.Canvas, camera: Camera, path: NDArray[np.float64], depth: float) -> None:
+    """Draw squares of 0.2 m on the floor, as far as the path reaches."""
+    low, high = _floor(path)
     for x in np.arange(low[0], high[0] + 0.01, 0.2):
         canvas.line(camera.line([(x, low[1], depth), (x, high[1], depth)]), S.GRID, 1)
     for y in np.arange(low[1], high[1] + 0.01, 0.2):
@@ -131,7 +140,7 @@ def arm_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
     points = plant.chain.joints([info[f"state/angle_{k}"] for k in range(plant.stages)])
     planned = plant.chain.joints([info[f"state/joint_reference_{k}"] for k in range(plant.stages)])
     with canvas.within(SCENE):
-        _grid(canvas, camera, np.vstack([path[:2].T, np.zeros((1, 2))]), floor)
+        _grid(canvas, camera, path, floor)
         for line, width in ((path[:2].T, 2), (points[:, :2], 6)):
             shadow = np.column_stack([line, np.full(len(line), floor)])
             canvas.line(camera.line(shadow), SHADE, width)
