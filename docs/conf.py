@@ -48,6 +48,7 @@ include_patterns = [
     "RELEASING.md",
     "docs/**.md",
     "docs/api/generated/**.rst",
+    "agents/pretrained/*.md",
     "benchmarks/LEADERBOARD.md",
     "benchmarks/leaderboard/*.md",
     "benchmarks/results/diagnosis.md",

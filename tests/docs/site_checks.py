@@ -14,6 +14,9 @@ from urllib.parse import unquote, urlsplit
 
 from tests.browser import NAMES, Browser, PageError, find
 
+API, SHARE = "docs/api/generated", 10
+"""Folder of the API reference, whose pages have one template, and the share of them for a browser:
+one in ten, since loading and checking a page takes a second or more."""
 PHONE = (390, 844)
 """Width and height of a phone [CSS pixels]."""
 TOO_WIDE = """(() => {
@@ -63,6 +66,14 @@ class Links(HTMLParser):
 def pages(folder: Path) -> list[Path]:
     """Return the pages of a site."""
     return sorted(folder.rglob("*.html"))
+
+
+def for_browser(folder: Path) -> list[Path]:
+    """Return the pages of a site that a browser loads: all, but of the API reference a share."""
+    found = pages(folder)
+    api = [page for page in found if page.is_relative_to(folder / API)]
+    left_out = set(api) - set(api[::SHARE])
+    return [page for page in found if page not in left_out]
 
 
 def broken_links(folder: Path) -> Iterator[str]:
@@ -116,8 +127,9 @@ def main() -> None:
     if program is None:
         print(f"no browser here: install one of {', '.join(NAMES)} to check the pages in it")
     else:
-        print(f"loading {len(pages(folder))} pages in {program}, some seconds each", flush=True)
-        faults += faults_in_browser(pages(folder), program)
+        chosen = for_browser(folder)
+        print(f"loading {len(chosen)} pages in {program}, some seconds each", flush=True)
+        faults += faults_in_browser(chosen, program)
     print(f"{len(pages(folder))} pages, {len(faults)} faults", *faults, sep="\n")
     sys.exit(bool(faults))
 

@@ -8,7 +8,14 @@ from pathlib import Path
 import pytest
 
 from tests.browser import NAMES, find
-from tests.docs.site_checks import axe_script, broken_links, faults_in_browser, pages
+from tests.docs.site_checks import (
+    API,
+    axe_script,
+    broken_links,
+    faults_in_browser,
+    for_browser,
+    pages,
+)
 
 pytest.importorskip("furo")
 pytest.importorskip("myst_nb")
@@ -52,6 +59,17 @@ def test_links_resolve_and_nothing_is_loaded_from_the_network(site):
 def test_pages_have_no_console_error_are_accessible_and_fit_a_phone(site):
     shown = [page for page in pages(site) if page.name not in SKIPPED]
     assert list(faults_in_browser(shown, PROGRAM)) == []
+
+
+def test_browser_loads_all_written_pages_and_a_tenth_of_the_api(tmp_path):
+    (tmp_path / API).mkdir(parents=True)
+    written = [tmp_path / f"page_{k}.html" for k in range(25)]
+    api = [tmp_path / API / f"module_{k:02}.html" for k in range(25)]
+    for path in (*written, *api):
+        path.write_text(LEAFLET)
+    chosen = for_browser(tmp_path)
+    assert set(written) <= set(chosen)
+    assert set(chosen) & set(api) == {api[0], api[10], api[20]}
 
 
 @pytest.mark.skipif(PROGRAM is None, reason=f"no browser here; install one of {', '.join(NAMES)}")

@@ -1,24 +1,13 @@
-"""Tutorials: each runs without an error, and its notebook holds the same cells."""
+"""Notebooks of the tutorials hold the cells of their pages."""
 
 import importlib.util
 from pathlib import Path
 
 import pytest
 
-from sweeps.limits import scaled
-
-jupytext = pytest.importorskip("jupytext")
-nbclient = pytest.importorskip("nbclient")
-pytest.importorskip("ipykernel")
+pytest.importorskip("jupytext")
 
 ROOT = Path(__file__).parents[2]
-NEEDED = {
-    "diagnose": ["matplotlib"],
-    "export": ["fmpy", "ziglang"],
-    "linear_design": ["control", "matplotlib"],
-    "robust": ["torch", "stable_baselines3", "onnxruntime"],
-    "train": ["torch", "stable_baselines3", "onnxruntime"],
-}
 
 
 def load_maker():
@@ -30,22 +19,6 @@ def load_maker():
 
 
 PAGES = {page.stem: page for page in load_maker().pages()}
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_tutorial_runs(name):
-    for package in NEEDED.get(name, ["matplotlib"]):
-        pytest.importorskip(package)
-    notebook = jupytext.read(PAGES[name])
-    client = nbclient.NotebookClient(
-        notebook,
-        timeout=int(scaled(600)),
-        kernel_name="python3",
-        resources={"metadata": {"path": str(ROOT)}},
-    )
-    client.execute()  # raises CellExecutionError with the failing cell
-    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert len(code) >= 3 and all(cell.execution_count for cell in code)
 
 
 @pytest.mark.parametrize("name", PAGES)

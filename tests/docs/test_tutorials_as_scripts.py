@@ -1,4 +1,4 @@
-"""Tutorials run as plain Python; with jupytext also as notebooks (test_tutorials.py)."""
+"""Tutorials run as plain Python; `make docs` executes them as notebooks."""
 
 import re
 from pathlib import Path
