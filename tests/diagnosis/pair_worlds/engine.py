@@ -3,7 +3,7 @@
 The force of a muscle is that of a braid of threads at an angle (Chou and Hannaford 1996) or a
 difference of exponentials; its friction is a Bouc-Wen or a Dahl model driven by its length; the
 regulator is of second order, or a lag with a limited rate; the friction of a bearing is a LuGre
-model.
+model; a mechanical stop is a Hertzian contact that dissipates (Hunt and Crossley 1975).
 """
 
 import math
@@ -15,6 +15,9 @@ BRAID, EXPONENTIAL = 0, 1
 BOUC_WEN, DAHL = 0, 1
 SECOND_ORDER, LIMITED_LAG = 0, 1
 LEVER, PULLEY, BRACE = 0, 1, 2
+CONTACT, LOSS = 4300.0, 0.3
+"""Stiffness of a mechanical stop [N m/rad^1.5], which 10 N m press in by a degree, and its
+damping over its force [s/rad]."""
 MUSCLE = (
     "size",  # force at 2 bar and full length [N]
     "most",  # contraction without force [1]
@@ -121,6 +124,16 @@ def loop(kind: int, c: np.ndarray, z: float, du: float) -> float:
 
 
 @njit(cache=True)
+def stopped(angle: float, speed: float, end: float) -> float:
+    """Return the torque of the stops at ``-end`` and ``end`` [rad], away from the nearer one."""
+    over = abs(angle) - end
+    if over <= 0.0:
+        return 0.0
+    inwards = -1.0 if angle > 0.0 else 1.0
+    return inwards * max(CONTACT * over**1.5 * (1.0 - LOSS * inwards * speed), 0.0)
+
+
+@njit(cache=True)
 def run(
     kinds: np.ndarray,
     muscles: np.ndarray,
@@ -135,7 +148,8 @@ def run(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return angles [rad], pressures [bar] and forces [N] at every row, from rest.
 
-    ``commands`` [bar] has the shape (muscles, rows); muscle m moves joint ``m // sides``.
+    ``commands`` [bar] has the shape (muscles, rows); muscle m moves joint ``m // sides``. ``link``
+    is length [m], mass [kg], centre [m], first angle and angle of the stops [rad].
     """
     n, m, rows = joints.shape[0], muscles.shape[0], commands.shape[1]
     sides, dt = m // n, period / sub
@@ -175,7 +189,7 @@ def run(
         extra = payload[row]
         for i in range(n):
             j = joints[i]
-            torque[i] += j[3] * (j[4] - q[i]) - j[1] * v[i]
+            torque[i] += j[3] * (j[4] - q[i]) - j[1] * v[i] + stopped(q[i], v[i], link[4])
             if j[5] > 0.0:
                 bound = j[5] * (j[6] + (1.0 - j[6]) * math.exp(-((v[i] / j[7]) ** 2)))
                 stiff = j[5] / j[8]

@@ -20,6 +20,11 @@ SUBSTEPS = 40
 NOISE = {"angle": 5e-4, "pressure": 400.0, "tension": 0.4}
 """Noise of the sensors [SI], by the first word of a channel."""
 BAR = 1e5
+STOP, CLEAR = 0.611, 0.53
+"""Angle of the stops of a lever [rad], 5 degrees before its stretched muscle has no arm left, and
+that within which a laboratory keeps a recording."""
+LOWER, LEAST = 0.9, 0.3
+"""Factor by which it lowers the amplitude of its setpoints until then, and the least amplitude."""
 HIDDEN: dict[str, dict[str, float]] = {
     "creep": {"creep": 0.06},
     "stick_slip": {"stiction": 1.0},
@@ -36,6 +41,7 @@ class Family:
 
     ``sizes`` are forces at 2 bar of the muscles of a joint [N]; ``joint`` are the fields of
     :data:`engine.JOINT` up to ``rest``; ``link`` is length [m], mass [kg], centre [m], first angle.
+    ``stop`` is the angle of the mechanical stops [rad], on either side.
     """
 
     place: int
@@ -47,6 +53,7 @@ class Family:
     link: tuple[float, float, float, float]
     stiction: float  # usual one [N m]
     joints: int = 1
+    stop: float = np.inf
 
 
 FAMILIES: dict[str, Family] = {
@@ -59,6 +66,7 @@ FAMILIES: dict[str, Family] = {
         (0.0063, 0.05, 0.368, 0.0, 0.0),
         (0.25, 0.0, 0.0, 0.0),
         0.04,
+        stop=STOP,
     ),
     "elbow_orthosis": Family(
         e.PULLEY,
@@ -90,6 +98,7 @@ FAMILIES: dict[str, Family] = {
         (0.25, 0.1, 0.125, 0.0),
         0.04,
         joints=2,
+        stop=STOP,
     ),
 }
 
@@ -149,31 +158,63 @@ def record(
     hidden : mapping
         Values of :data:`HIDDEN`.
     """
-    family, random, hidden = FAMILIES[name], np.random.default_rng(seed), hidden or {}
+    hidden = hidden or {}
+    inputs, labels = campaign(1)
+    family, pair = FAMILIES[name], (inputs["set_point_a"], inputs["set_point_b"])
+    payload = inputs["payload"] if name == "antagonistic_joint" else np.zeros(len(labels))
+    amplitude = 1.0
+    while name == "redundant_manipulator" and amplitude > LEAST:
+        tried = _commands(family, pair, amplitude)
+        angles, *_ = _run(name, world, np.random.default_rng(seed), {}, tried, payload)
+        if np.abs(angles).max() < CLEAR:
+            break
+        amplitude *= LOWER
+    commands, random = _commands(family, pair, amplitude), np.random.default_rng(seed)
+    found = _run(name, world, random, hidden, commands, payload)
+    return _recording(name, commands, payload, found, hidden, random)
+
+
+def _commands(
+    family: Family, pair: tuple[np.ndarray, np.ndarray], amplitude: float
+) -> list[np.ndarray]:
+    """Return the setpoints [Pa] of all muscles, from those of a pair and the part of the swing."""
+    a, b = pair
+    mean, half = 0.5 * (a + b), 0.5 * amplitude * (a - b)
+    commands = [mean + half, mean - half] if amplitude < 1.0 else [a, b]
+    commands = commands[: len(family.sizes)]
+    if family.joints == 2:
+        commands += [np.roll(c, len(a) // 3) for c in commands]
+    return commands
+
+
+def _run(
+    name: str,
+    world: str,
+    random: np.random.Generator,
+    hidden: Mapping[str, float],
+    commands: list[np.ndarray],
+    payload: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Draw a rig and return its angles [rad], pressures [Pa] and forces [N], each (n, rows)."""
+    family = FAMILIES[name]
     law, friction, regulator = WORLDS[world]
     muscles = _muscles(family, random, hidden)
     valve = _valve(regulator, random, hidden)
     joint = np.array(family.joint) * np.array([*random.uniform(0.85, 1.15, 4), 1.0])
     bearing = [hidden.get("stiction", 0.0) * family.stiction, 0.55, 0.05, 2e-3]
-    joints = np.array([[*joint, *bearing]] * family.joints)
-    inputs, labels = campaign(1)
-    commands = [inputs["set_point_a"], inputs["set_point_b"]][: len(family.sizes)]
-    if family.joints == 2:
-        commands += [np.roll(c, len(labels) // 3) for c in commands]
-    payload = inputs["payload"] if name == "antagonistic_joint" else np.zeros(len(labels))
     angles, pressures, forces = e.run(
         np.array([law, friction, regulator, family.place]),
         muscles,
         valve,
-        joints,
+        np.array([[*joint, *bearing]] * family.joints),
         np.array(family.geometry),
-        np.array(family.link),
+        np.array([*family.link, family.stop]),
         np.array(commands) / BAR,
         payload,
         PERIOD,
         SUBSTEPS,
     )
-    return _recording(name, commands, payload, (angles, BAR * pressures, forces), hidden, random)
+    return angles, BAR * pressures, forces
 
 
 def _recording(
