@@ -57,6 +57,7 @@ from baselines.predictive.rate_limited import best_path
 from baselines.predictive.regulator import Arrival, BankState, RegulatorBank
 from pam_envs.arrays import Array
 from pam_envs.hysteresis.protocol import RowsState
+from pam_envs.kernels.build import entry
 from pam_envs.parameters import Signal
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
@@ -125,6 +126,26 @@ class Demand(NamedTuple):
     value: Array
     correction: Array
     weight: Array
+
+
+class Course(NamedTuple):
+    """Plan of a gait at the times that a period needs.
+
+    Samples have the shape (n_env, 2, ...), what is in stance (n_env, ...): ``samples`` at the
+    nodes, ``soon`` ``EARLY`` after them, ``whole`` at control periods from the last one on, and
+    ``whole_stance`` there. ``stance``, ``begins`` and ``ended`` are the nodes, the times ``EARLY``
+    after and those ``LATE`` before them, ``past`` the last control periods, the newest first; they
+    are in stance if the planned samples on both sides are.
+    """
+
+    samples: Array
+    soon: Array
+    whole: Array
+    whole_stance: Rows
+    stance: Rows
+    begins: Rows
+    ended: Rows
+    past: Rows
 
 
 class AnticipationState(NamedTuple):
@@ -223,9 +244,13 @@ class KneeAnticipation(RowController):
         arrival = self.bank.arrival(now.bank)
         later = self.observer.nominal.along(arrival.pressures, now.hysteresis)
         ends = arrival.delay[:, None] + ENDS
-        planned = self._ahead(now, ends)
-        angle, response = self._angles_ahead(view, observation, now, arrival, ends, planned[0])
-        demand = self._demand(view, now, ends, planned, more)
+        if self.observer.gait:
+            course = self._course(now, ends)
+            angle, response = self._angles_ahead(view, observation, now, arrival, ends, course)
+            demand = self._demand(view, now, ends, course, more)
+        else:
+            angle, response = np.zeros_like(ends), np.zeros((*ends.shape, 0))
+            demand = self._demand_of_brace(now, ends)
         stiffness, weight = self._stiffness(demand, angle), self._weight(demand, angle)
         path = (inverse or partial(self._inverse, now.moments))(stiffness, later)
         reach = (arrival.rate * self.bank.period)[:, None] * np.array(BLOCKS, float)
@@ -344,7 +369,7 @@ class KneeAnticipation(RowController):
 
     def _angles_ahead(
         self, view: KneeView, observation: ArrayLike, now: AnticipationState, arrival: Arrival,
-        ends: Array, planned: Array,
+        ends: Array, course: Course,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return the predicted angles [rad] at the nodes of a gait, (n_env, n_nodes).
 
@@ -352,16 +377,11 @@ class KneeAnticipation(RowController):
         Until a setpoint of now takes effect the torque is that of the nominal muscle under the
         pressures to come; afterwards that of the path planned in the last period.
         """
-        if self.torque is None:
-            return np.zeros_like(ends), np.zeros((*ends.shape, 0))
-        nominal, n = self.observer.nominal, len(ends)
-        lever, last = nominal.plant.lever, math.ceil(ends.max()) + 1
-        times = np.arange(-1.0, last + 2.0)
-        samples, _ = self._ahead(now, np.tile(times, (n, 1)))
+        nominal, path = self.observer.nominal, course.whole[:, 1]
+        lever, last = nominal.plant.lever, path.shape[1] - 3
         here = now.wearer[:, [0, 2]].sum(axis=1)[:, None]
-        path, stance = samples[:, 1], self._in_stance(samples[:, 0], samples[:, 1], now)
         halves = np.arange(last) + 0.5
-        torque = _planned_torque(now, ends, np.tile(halves, (n, 1)))
+        torque = _planned_torque(now, ends, np.tile(halves, (len(ends), 1)))
         middle = 0.5 * (path[:, 1:-2] + path[:, 2:-1]) + here
         hysteresis, gain = now.hysteresis, now.moments[:, 1] / now.moments[:, 0]
         for k, pressure in enumerate(arrival.pressures):
@@ -370,17 +390,17 @@ class KneeAnticipation(RowController):
             given = lever.torque(tension, middle[:, k])
             torque[:, k] = np.where(k + 0.5 < arrival.delay, given, torque[:, k])
         torque = torque + self._leg.passive(path)[:, :last]
-        load = self._loads_ahead(observation, now, np.arange(last) + 0.5)
-        course = self._leg.along(now.wearer[:, :2], torque, load)[..., 0]
+        load = self._loads_ahead(observation, now, halves)
+        along = self._leg.along(now.wearer[:, :2], torque, load)[..., 0]
         ratio = _yielded(now.yielding)
-        scale = np.where(stance[:, 1:-1], ratio[:, 1:], ratio[:, :1])
+        scale = np.where(course.whole_stance[:, 1:-1], ratio[:, 1:], ratio[:, :1])
         response = self._leg.response(load, scale, ends, arrival.delay)
-        course = course * scale
+        along = along * scale
         whole = np.floor(ends).astype(np.int64)
-        low = np.take_along_axis(course, whole, axis=1)
-        high = np.take_along_axis(course, whole + 1, axis=1)
+        low = np.take_along_axis(along, whole, axis=1)
+        high = np.take_along_axis(along, whole + 1, axis=1)
         off = low + (ends - whole) * (high - low) + now.wearer[:, 2:]
-        return planned[:, 1] + _near(off), response
+        return course.samples[:, 1] + _near(off), response
 
     def _loads_ahead(self, observation: ArrayLike, now: AnticipationState, times: Array) -> Array:
         """Return the loads on the leg [1] after periods, (n_env, n_times).
@@ -416,52 +436,54 @@ class KneeAnticipation(RowController):
         slack = self.observer.nominal.free_tension(angle) <= SMALLEST
         return np.where(((planned | (stance & slack)) == stance)[:, None], fit, sure)
 
+    def _demand_of_brace(self, now: AnticipationState, ends: Array) -> Demand:
+        """Return the demanded stiffness of the brace alone at the nodes."""
+        samples, known = self._ahead(now, ends)
+        weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
+        reference = self._brace_stiffness(now, ends, samples[:, 0])
+        return Demand(np.ones_like(known), reference, np.zeros_like(ends), weight)
+
     def _demand(
-        self, view: KneeView, now: AnticipationState, ends: Array, planned: tuple[Array, Rows],
+        self, view: KneeView, now: AnticipationState, ends: Array, course: Course,
         more: Correction | None,
     ) -> Demand:  # fmt: skip
-        """Return what is demanded at the nodes.
+        """Return what is demanded at the nodes of a gait.
 
         The nodes up to ``EARLY`` before heel contact are those of the stance that begins. Those up
         to ``LATE`` after toe-off are in stance while stance is sensed, with the nominal stride's
         torque.
         """
-        nominal, plan, (samples, known) = self.observer.nominal, now.plan, planned
-        weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
-        if self.torque is None or self.stride is None:
-            reference = self._brace_stiffness(now, ends, samples[:, 0])
-            return Demand(np.ones_like(known), reference, np.zeros_like(ends), weight)
-        lever, place = nominal.plant.lever, _point(now)[:, None]
-        stance = self._wholly_in_stance(plan, ends, now)
-        soon = self._wholly_in_stance(plan, ends + EARLY, now) & ~stance
-        samples = np.where(soon[:, None], self._ahead(now, ends + EARLY)[0], samples)
-        torque = lever.torque(samples[:, 0], samples[:, 1])
-        late = self._wholly_in_stance(plan, ends - LATE, now) & view.stance[:, None]
-        late &= ~(stance | soon)
+        assert self.stride is not None
+        nominal, place = self.observer.nominal, _point(now)[:, None]
+        soon = course.begins & ~course.stance
+        samples = np.where(soon[:, None], course.soon, course.samples)
+        torque = nominal.plant.lever.torque(samples[:, 0], samples[:, 1])
+        late = course.ended & view.stance[:, None] & ~(course.stance | soon)
         torque = np.where(late, self.stride.torque(place + ends), torque)
-        stance |= late
-        torque = torque + self._excess_ahead(now, ends)
+        torque = torque + self._excess_ahead(now, ends, course.past)
         slack = (nominal.free_tension(samples[:, 1]) <= SMALLEST) & (samples[:, 0] <= SMALLEST)
-        stance = stance | soon | (slack & self.stride.in_stance(place + ends))
+        stance = course.stance | late | soon
+        stance = stance | (slack & self.stride.in_stance(place + ends))
         correction = np.zeros_like(ends)
         if more is not None:
-            correction = more(self.phase.present(plan)[:, None] + ends)
+            correction = more(self.phase.present(now.plan)[:, None] + ends)
+        weight = np.broadcast_to(np.array(BLOCKS, float), ends.shape)
         return Demand(stance, torque, correction, weight)
 
-    def _excess_ahead(self, now: AnticipationState, ends: Array) -> Array:
+    def _excess_ahead(self, now: AnticipationState, ends: Array, past: Rows) -> Array:
         """Return the distances [N m] of the torque from the plan at the nodes.
 
-        In swing, where the plan has no torque, the distance is that from the nominal stride.
+        ``past`` is that of the course. In swing, where the plan has no torque, the distance is that
+        from the nominal stride.
         """
         assert self.stride is not None
         plan, back = now.plan, np.arange(PAST)
         times = np.tile(-back.astype(float), (len(ends), 1))
         samples, known = self.phase.read(plan, times)
         planned = self.observer.nominal.plant.lever.torque(samples[:, 0], samples[:, 1])
-        stance = known & self._wholly_in_stance(plan, times, now)
         swing = now.past - self.stride.torque(_point(now)[:, None] + times)
         swing = np.where(np.abs(swing) < RIVAL, swing, 0.0)
-        excess = np.where(stance, now.past - planned, swing)
+        excess = np.where(known & past, now.past - planned, swing)
         first = np.minimum(back, plan.seen.step[:, None])  # nothing was sensed before the start
         return self._predictor.predict(np.take_along_axis(excess, first, axis=1), ends)
 
@@ -486,17 +508,31 @@ class KneeAnticipation(RowController):
         usual = self.observer.nominal.stretch(angle) / USUAL_STRETCH
         return np.asarray(demand.weight * np.where(demand.stance, 1.0, SWING) * usual**2)
 
-    def _wholly_in_stance(self, plan: Plan, ends: Array, now: AnticipationState) -> Rows:
-        """Return whether the samples on both sides of each node are in stance, (n_env, n_nodes).
+    def _course(self, now: AnticipationState, ends: Array) -> Course:
+        """Return the plan of a gait around nodes, shape (n_env, n_nodes).
 
-        A tension interpolated between stance and swing belongs to neither.
+        A tension interpolated between stance and swing belongs to neither, hence the samples on
+        both sides.
         """
-        present = self.phase.present(plan)[:, None]
-        times = self.phase.memory.within(plan.seen, present + ends)
-        around = np.concatenate([np.floor(times), np.ceil(times)], axis=1)
-        samples, _ = self._ahead(now, around - present)
-        before, after = np.hsplit(self._in_stance(samples[:, 0], samples[:, 1], now), 2)
-        return np.asarray(before & after)
+        n, nodes = ends.shape
+        whole = np.tile(np.arange(-1.0, math.ceil(ends.max()) + 3.0), (n, 1))
+        past = np.tile(-np.arange(PAST, dtype=float), (n, 1))
+        present = self.phase.present(now.plan)[:, None]
+        sought = np.concatenate([ends, ends + EARLY, ends - LATE, past], axis=1)
+        times = self.phase.memory.within(now.plan.seen, present + sought)
+        sides = [np.floor(times) - present, np.ceil(times) - present]
+        at = np.concatenate([ends, ends + EARLY, whole, *sides], axis=1)
+        samples, _ = self._ahead(now, at)
+        stance = self._in_stance(samples[:, 0], samples[:, 1], now)
+        first, count = 2 * nodes + whole.shape[1], sought.shape[1]
+        both = stance[:, first : first + count] & stance[:, first + count :]
+        return Course(
+            samples[..., :nodes],
+            samples[..., nodes : 2 * nodes],
+            samples[..., 2 * nodes : first],
+            stance[:, 2 * nodes : first],
+            *np.split(both, [nodes, 2 * nodes, 3 * nodes], axis=1),
+        )
 
     def _place(self, plan: Plan, before: Array) -> Array:
         """Return the present in the nominal stride; it is sought until that is in the plan."""
@@ -522,21 +558,23 @@ class KneeAnticipation(RowController):
         later = self.phase.present(plan)[:, None] + ends - plan.seen.step[:, None]
         last = np.full((len(ends), 1), float(memory.ahead[-1]))
         end, _ = memory.read(plan.seen, plan.seen.step[:, None] + last)
-        place = now.place[:, None]
-        nominal, there = self.stride.read(place + later), self.stride.read(place + last)
+        place, stride = now.place[:, None], self.stride
+        point, end_point = stride.nearest(place + later), stride.nearest(place + last)
+        nominal, there = stride.samples[:, point], stride.samples[:, end_point]
         fades = np.exp(-np.maximum(later - last, 0.0) / KEPT)
         angle = nominal[1] + (end[:, 1] - there[1]) * fades
-        nominal_stance, stance = self._loaded(nominal), self._loaded(there)
-        off = np.where(stance, end[:, 0] - there[0], 0.0)
+        off = np.where(self._loaded[end_point], end[:, 0] - there[0], 0.0)
         free = self.observer.nominal.free_tension(angle) + now.offset[:, None]
-        tension = np.where(nominal_stance, nominal[0] + off * fades, free)
+        tension = np.where(self._loaded[point], nominal[0] + off * fades, free)
         found = np.stack([np.maximum(tension, 0.0), angle], axis=1)
         return np.where(known[:, None], samples, found), np.ones_like(known)
 
-    def _loaded(self, nominal: Array) -> Rows:
-        """Return where samples of the nominal stride, (2, ...), are in stance."""
-        free = self.observer.nominal.free_tension(nominal[1])
-        return np.asarray(np.abs(nominal[0] - free) > SMALLEST)
+    @cached_property
+    def _loaded(self) -> Rows:
+        """Where the samples of the nominal stride are in stance, shape (n_points,)."""
+        assert self.stride is not None
+        tension, angle = self.stride.samples
+        return np.asarray(np.abs(tension - self.observer.nominal.free_tension(angle)) > SMALLEST)
 
     def _brace_stiffness(self, now: AnticipationState, ends: Array, reference: Array) -> Array:
         """Return stiffnesses [N/m] of the brace alone for previewed references."""
@@ -563,8 +601,28 @@ def _yielded(yielding: Array) -> Array:
 
 def _planned_torque(now: AnticipationState, ends: Array, times: Array) -> Array:
     """Return the torques [N m] planned in the last period at times, (n_env, n_times)."""
-    rows = zip(times, ends - 1.0, now.torque, strict=True)
-    return np.stack([np.interp(at, nodes, torque) for at, nodes, torque in rows])
+    found = np.empty_like(times, order="C")
+    between_rows(np.ascontiguousarray(times), ends - 1.0, now.torque, found)
+    return found
+
+
+@entry
+def between_rows(times: Array, nodes: Array, values: Array, found: Array) -> None:
+    """Write the values at times that increase, linear between nodes, constant beyond them."""
+    last = nodes.shape[1] - 1
+    for i in range(len(times)):
+        k = 0
+        for j in range(times.shape[1]):
+            time = times[i, j]
+            while k < last and nodes[i, k + 1] <= time:
+                k += 1
+            if time <= nodes[i, 0]:
+                found[i, j] = values[i, 0]
+            elif k == last:
+                found[i, j] = values[i, last]
+            else:
+                rate = (values[i, k + 1] - values[i, k]) / (nodes[i, k + 1] - nodes[i, k])
+                found[i, j] = rate * (time - nodes[i, k]) + values[i, k]
 
 
 def _near(deviation: Array) -> Array:

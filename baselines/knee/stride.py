@@ -109,11 +109,11 @@ class NominalStride:
 
     def read(self, points: NDArray[np.generic]) -> Array:
         """Return tension [N] and angle [rad] at the nearest points of the stride, (2, ...)."""
-        return self.samples[:, self._near(points)]
+        return self.samples[:, self.nearest(points)]
 
     def load(self, points: NDArray[np.generic]) -> Array:
         """Return the load on the leg [1] at the nearest points of the stride."""
-        return self.loads[self._near(points)]
+        return self.loads[self.nearest(points)]
 
     def torque(self, points: NDArray[np.generic]) -> Array:
         """Return the torque reference [N m], also in swing, at points of the stride."""
@@ -123,9 +123,10 @@ class NominalStride:
 
     def in_stance(self, points: NDArray[np.generic]) -> Rows:
         """Return whether the nearest points of the stride are in stance."""
-        return self.stance[self._near(points)]
+        return self.stance[self.nearest(points)]
 
-    def _near(self, points: NDArray[np.generic]) -> NDArray[np.int64]:
+    def nearest(self, points: NDArray[np.generic]) -> NDArray[np.int64]:
+        """Return the indices of the nearest samples of the stride."""
         count = self.samples.shape[1]
         return np.floor(points * (count / self.length) + 0.5).astype(np.int64) % count
 

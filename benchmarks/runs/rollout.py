@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import tee
 from typing import Any
 
 import numpy as np
@@ -187,7 +188,7 @@ def _run_rows(
     """Step until every row has ended once; return the first episode of each, without times.
 
     The batches are rows of one controller. A batch whose rows have all ended is no longer stepped;
-    its rows are at the start of an episode.
+    its rows stay at the first observation of another episode.
     """
     runs = [_BatchRun(*of_part) for of_part in zip(batches, seeds, strict=True)]
     model_output = getattr(controller, "model_output", None)
@@ -205,6 +206,8 @@ def _run_rows(
         for run, (own, outputs) in zip(runs, split, strict=True):
             if run.running.any():
                 run.step(own, outputs)
+            else:
+                run.start[:] = False  # the controller has begun that episode
     return [run.episodes() for run in runs]
 
 
@@ -283,13 +286,15 @@ def preview_used(episode: Episode, controller: Controller, signals: Any) -> floa
     if not ahead or not len(episode.observations):
         return 0.0
     seconds = {signal.index: signal.ahead for signal in signals}
-    plain, _ = _timed(controller, episode.observations)
+    plain = _answers(controller, episode.observations)
     for first in range(len(ahead), 0, -1):
         masked = episode.observations.copy()
         for number in range(first, len(ahead) + 1):
             for column, present in ahead[number]:
                 masked[:, column] = masked[:, present]
-        if not np.array_equal(_timed(controller, masked)[0], plain, equal_nan=True):
+        plain, again = tee(plain)
+        pairs = zip(again, _answers(controller, masked), strict=True)
+        if not all(np.array_equal(a, b, equal_nan=True) for (a, _), (b, _) in pairs):
             return round(max(seconds[column] for column, _ in ahead[first]), 9)
     return 0.0
 
@@ -306,10 +311,14 @@ def _previewed(index: Mapping[str, int]) -> dict[int, list[tuple[int, int]]]:
 
 def _timed(controller: Controller, observations: NDArray[Any]) -> tuple[NDArray[Any], Array]:
     """Return a controller's actions for an episode's observations, and their times [s]."""
-    answers, seconds, state, clock = [], [], None, time.perf_counter
+    answers, seconds = zip(*_answers(controller, observations), strict=True)
+    return np.array(answers), np.array(seconds)
+
+
+def _answers(controller: Controller, observations: NDArray[Any]) -> Iterator[tuple[Any, float]]:
+    """Yield the actions of a controller for an episode's observations, and their times [s]."""
+    state, clock = None, time.perf_counter
     for i, observation in enumerate(observations):
         begin = clock()
         action, state = controller.predict(observation, state, i == 0, True)
-        seconds.append(clock() - begin)
-        answers.append(action)
-    return np.array(answers), np.array(seconds)
+        yield action, clock() - begin
