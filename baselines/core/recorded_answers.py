@@ -60,7 +60,10 @@ class RecordedAnswers:
 
 
 def answers(controller: Any, observations: Array) -> Array:
-    """Return the actions, (steps, n_actions), of a controller for an episode's observations."""
+    """Return a controller's actions, (steps, ..., n_actions), for observations in order.
+
+    The observations have the shape (steps, n_signals), or (steps, n_env, n_signals) for rows.
+    """
     made, state = [], None
     for step, observation in enumerate(observations):
         action, state = controller.predict(observation, state, step == 0)

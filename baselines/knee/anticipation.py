@@ -116,16 +116,25 @@ effect, to pressures [Pa]."""
 
 
 class Demand(NamedTuple):
-    """What is demanded at the nodes, each of shape (n_env, n_nodes).
+    """What is demanded at the nodes of a gait, each of shape (n_env, n_nodes).
 
-    ``value`` is the torque [N m] in the stance of a gait, to which ``correction`` adds a tension
-    [N], and the stiffness [N/m] of the brace alone. ``weight`` is that of a squared error.
+    ``torque`` is that in stance [N m], to which ``correction`` adds a tension [N].
     """
 
     stance: Rows
-    value: Array
+    torque: Array
     correction: Array
-    weight: Array
+
+
+class Held(NamedTuple):
+    """Nominal muscle under the pressures until a setpoint of now takes effect.
+
+    ``stiffness`` is that at the ends of the stages [N/m], shape (n_env, n_stages); ``hysteresis``
+    is the state after them.
+    """
+
+    stiffness: Array
+    hysteresis: RowsState
 
 
 class Course(NamedTuple):
@@ -242,29 +251,27 @@ class KneeAnticipation(RowController):
         """
         view, signal = self.observer.read(observation), self.action_signal
         arrival = self.bank.arrival(now.bank)
-        later = self.observer.nominal.along(arrival.pressures, now.hysteresis)
-        ends = arrival.delay[:, None] + ENDS
-        if self.observer.gait:
-            course = self._course(now, ends)
-            angle, response = self._angles_ahead(view, observation, now, arrival, ends, course)
-            demand = self._demand(view, now, ends, course, more)
-        else:
-            angle, response = np.zeros_like(ends), np.zeros((*ends.shape, 0))
-            demand = self._demand_of_brace(now, ends)
-        stiffness, weight = self._stiffness(demand, angle), self._weight(demand, angle)
-        path = (inverse or partial(self._inverse, now.moments))(stiffness, later)
+        nominal, ends = self.observer.nominal, arrival.delay[:, None] + ENDS
+        pressures = inverse or partial(self._inverse, now.moments)
         reach = (arrival.rate * self.bank.period)[:, None] * np.array(BLOCKS, float)
         start = arrival.pressures[-1]
         if self.observer.gait:
-            slope = self.observer.nominal.per_stiffness * now.moments[:, :1] / now.moments[:, 1:]
-            push = self._push(now, ends, demand, angle, stiffness, slope)
-            full = self.observer.nominal.full_pressure
+            course, held = self._course(now, ends), self._held(now, arrival)
+            angle, response = self._angles_ahead(observation, now, arrival, ends, course, held)
+            demand = self._demand(view, now, ends, course, more)
+            angles = angle + BESIDE * np.array([0.0, -1.0, 1.0])[:, None, None]
+            stiffness, weight = self._stiffness(demand, angles), self._weight(demand, angle)
+            path = pressures(stiffness[0], held.hysteresis)
+            slope = nominal.per_stiffness * now.moments[:, :1] / now.moments[:, 1:]
+            push, full = self._push(now, ends, angles, stiffness, slope), nominal.full_pressure
             best, off = pushed_path(start, path, weight, reach, push, response, full)
-            reached, angle = stiffness + (best - path) / slope, angle + _near(off)
+            reached, angle = stiffness[0] + (best - path) / slope, angle + _near(off)
             torque = self._torque(np.clip(reached, 0.0, full / slope), angle)
             now = now._replace(torque=torque)
         else:
-            best = best_path(start, path, weight, reach)
+            demanded, weight = self._demand_of_brace(now, ends)
+            later = nominal.along(arrival.pressures, now.hysteresis)
+            best = best_path(start, pressures(demanded, later), weight, reach)
         command = arrival.set_point(best[:, 0], self.bank.period)
         command = np.minimum(np.maximum(command, signal.low), signal.high)
         after = now._replace(bank=self.bank.advance(now.bank, command))
@@ -276,24 +283,35 @@ class KneeAnticipation(RowController):
         return self.observer.nominal.plant.lever.torque(tension, angle)
 
     def _push(
-        self, now: AnticipationState, ends: Array, demand: Demand, angle: Array, stiffness: Array,
-        slope: Array,
-    ) -> Push:  # fmt: skip
-        """Return the linear model of the pushed knee at predicted angles [rad].
+        self, now: AnticipationState, ends: Array, angles: Array, stiffness: Array, slope: Array
+    ) -> Push:
+        """Return the linear model of the pushed knee at predicted angles.
 
-        ``stiffness`` is that demanded there [N/m], ``slope`` the pressure over the stiffness
-        [Pa m/N].
+        Parameters
+        ----------
+        now, ends
+            State, and the nodes [control periods], shape (n_env, n_nodes).
+        angles, stiffness : ndarray, shape (3, n_env, n_nodes)
+            Predicted angles [rad], those less and those more, and the stiffnesses demanded there
+            [N/m].
+        slope : ndarray, shape (n_env, 1)
+            Pressure over stiffness [Pa m/N].
         """
-        nominal, lever = self.observer.nominal, self.observer.nominal.plant.lever
-        before = _planned_torque(now, ends, ends)
-        less, more, wide = angle - BESIDE, angle + BESIDE, 2.0 * BESIDE
-        change = self._stiffness(demand, more) - self._stiffness(demand, less)
+        nominal, lever, wide = self.observer.nominal, self.observer.nominal.plant.lever, 2 * BESIDE
+        here, less, more = self._torque(stiffness[0], angles)
         return Push(
-            excess=self._torque(stiffness, angle) - before,
-            per_pressure=nominal.stretch(angle) * lever.lever_arm(angle) / slope,
-            per_angle=(self._torque(stiffness, more) - self._torque(stiffness, less)) / wide,
-            pressure_per_angle=change / wide * slope,
+            excess=here - _planned_torque(now, ends, ends),
+            per_pressure=nominal.stretch(angles[0]) * lever.lever_arm(angles[0]) / slope,
+            per_angle=(more - less) / wide,
+            pressure_per_angle=(stiffness[2] - stiffness[1]) / wide * slope,
         )
+
+    def _held(self, now: AnticipationState, arrival: Arrival) -> Held:
+        """Return stiffnesses and hysteresis until a setpoint of now takes effect."""
+        stiffness, hysteresis = np.empty(arrival.pressures.T.shape), now.hysteresis
+        for k, pressure in enumerate(arrival.pressures):
+            stiffness[:, k], hysteresis = self.observer.nominal.forward(pressure, hysteresis)
+        return Held(stiffness, hysteresis)
 
     def _inverse(self, moments: Array, stiffness: Array, later: RowsState) -> Array:
         """Return the pressures [Pa] of stiffnesses [N/m] for the gain of the moments."""
@@ -368,8 +386,8 @@ class KneeAnticipation(RowController):
         return now._replace(wearer=np.stack([off, rate, differs], axis=1), yielding=yielding)
 
     def _angles_ahead(
-        self, view: KneeView, observation: ArrayLike, now: AnticipationState, arrival: Arrival,
-        ends: Array, course: Course,
+        self, observation: ArrayLike, now: AnticipationState, arrival: Arrival, ends: Array,
+        course: Course, held: Held,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return the predicted angles [rad] at the nodes of a gait, (n_env, n_nodes).
 
@@ -382,13 +400,12 @@ class KneeAnticipation(RowController):
         here = now.wearer[:, [0, 2]].sum(axis=1)[:, None]
         halves = np.arange(last) + 0.5
         torque = _planned_torque(now, ends, np.tile(halves, (len(ends), 1)))
-        middle = 0.5 * (path[:, 1:-2] + path[:, 2:-1]) + here
-        hysteresis, gain = now.hysteresis, now.moments[:, 1] / now.moments[:, 0]
-        for k, pressure in enumerate(arrival.pressures):
-            stiffness, hysteresis = nominal.forward(pressure, hysteresis)
-            tension = gain * np.maximum(stiffness, 0.0) * nominal.stretch(middle[:, k])
-            given = lever.torque(tension, middle[:, k])
-            torque[:, k] = np.where(k + 0.5 < arrival.delay, given, torque[:, k])
+        stages = held.stiffness.shape[1]
+        middle = (0.5 * (path[:, 1:-2] + path[:, 2:-1]) + here)[:, :stages]
+        gain = (now.moments[:, 1] / now.moments[:, 0])[:, None]
+        tension = gain * np.maximum(held.stiffness, 0.0) * nominal.stretch(middle)
+        given, early = lever.torque(tension, middle), halves[:stages] < arrival.delay[:, None]
+        torque[:, :stages] = np.where(early, given, torque[:, :stages])
         torque = torque + self._leg.passive(path)[:, :last]
         load = self._loads_ahead(observation, now, halves)
         along = self._leg.along(now.wearer[:, :2], torque, load)[..., 0]
@@ -436,12 +453,11 @@ class KneeAnticipation(RowController):
         slack = self.observer.nominal.free_tension(angle) <= SMALLEST
         return np.where(((planned | (stance & slack)) == stance)[:, None], fit, sure)
 
-    def _demand_of_brace(self, now: AnticipationState, ends: Array) -> Demand:
-        """Return the demanded stiffness of the brace alone at the nodes."""
-        samples, known = self._ahead(now, ends)
+    def _demand_of_brace(self, now: AnticipationState, ends: Array) -> tuple[Array, Array]:
+        """Return stiffnesses [N/m] of the brace alone at the nodes, and the weights of errors."""
+        samples, known = self.phase.read(now.plan, ends)
         weight = np.where(known, 1.0, UNKNOWN) * np.array(BLOCKS, float)
-        reference = self._brace_stiffness(now, ends, samples[:, 0])
-        return Demand(np.ones_like(known), reference, np.zeros_like(ends), weight)
+        return self._brace_stiffness(now, ends, samples[:, 0]), weight
 
     def _demand(
         self, view: KneeView, now: AnticipationState, ends: Array, course: Course,
@@ -467,8 +483,7 @@ class KneeAnticipation(RowController):
         correction = np.zeros_like(ends)
         if more is not None:
             correction = more(self.phase.present(now.plan)[:, None] + ends)
-        weight = np.broadcast_to(np.array(BLOCKS, float), ends.shape)
-        return Demand(stance, torque, correction, weight)
+        return Demand(stance, torque, correction)
 
     def _excess_ahead(self, now: AnticipationState, ends: Array, past: Rows) -> Array:
         """Return the distances [N m] of the torque from the plan at the nodes.
@@ -493,20 +508,16 @@ class KneeAnticipation(RowController):
         return TorqueAhead(math.ceil(farthest) + 1)
 
     def _stiffness(self, demand: Demand, angle: Array) -> Array:
-        """Return the demanded stiffnesses [N/m] at angles [rad] of the nodes."""
-        if not self.observer.gait:
-            return demand.value
+        """Return the demanded stiffnesses [N/m] at angles [rad], shapes (..., n_env, n_nodes)."""
         nominal = self.observer.nominal
-        tension = nominal.plant.lever.tension(demand.value, angle) + demand.correction
+        tension = nominal.plant.lever.tension(demand.torque, angle) + demand.correction
         demanded = np.where(demand.stance, np.maximum(tension, 0.0), nominal.free_tension(angle))
         return np.asarray(demanded / nominal.stretch(angle))
 
     def _weight(self, demand: Demand, angle: Array) -> Array:
         """Return the weights of squared errors of the pressure at the nodes."""
-        if not self.observer.gait:
-            return demand.weight
         usual = self.observer.nominal.stretch(angle) / USUAL_STRETCH
-        return np.asarray(demand.weight * np.where(demand.stance, 1.0, SWING) * usual**2)
+        return np.array(BLOCKS, float) * np.where(demand.stance, 1.0, SWING) * usual**2
 
     def _course(self, now: AnticipationState, ends: Array) -> Course:
         """Return the plan of a gait around nodes, shape (n_env, n_nodes).
@@ -522,8 +533,7 @@ class KneeAnticipation(RowController):
         times = self.phase.memory.within(now.plan.seen, present + sought)
         sides = [np.floor(times) - present, np.ceil(times) - present]
         at = np.concatenate([ends, ends + EARLY, whole, *sides], axis=1)
-        samples, _ = self._ahead(now, at)
-        stance = self._in_stance(samples[:, 0], samples[:, 1], now)
+        samples, stance = self._ahead(now, at)
         first, count = 2 * nodes + whole.shape[1], sought.shape[1]
         both = stance[:, first : first + count] & stance[:, first + count :]
         return Course(
@@ -547,14 +557,16 @@ class KneeAnticipation(RowController):
         return self.stride.phase(seen, ahead, sought, before)
 
     def _ahead(self, now: AnticipationState, ends: Array) -> tuple[Array, Rows]:
-        """Return the planned samples after ``ends`` periods, and where they are known.
+        """Return the planned samples after ``ends`` periods, and where they are in stance.
 
-        Others are those of the nominal stride, whose differences at the end of the preview fade.
+        Unknown ones are those of the nominal stride, whose differences at the end of the preview
+        fade.
         """
+        assert self.stride is not None
         plan, memory = now.plan, self.phase.memory
         samples, known = self.phase.read(plan, ends)
-        if self.stride is None or np.all(known):
-            return samples, known
+        if np.all(known):
+            return samples, self._in_stance(samples[:, 0], samples[:, 1], now)
         later = self.phase.present(plan)[:, None] + ends - plan.seen.step[:, None]
         last = np.full((len(ends), 1), float(memory.ahead[-1]))
         end, _ = memory.read(plan.seen, plan.seen.step[:, None] + last)
@@ -563,11 +575,13 @@ class KneeAnticipation(RowController):
         nominal, there = stride.samples[:, point], stride.samples[:, end_point]
         fades = np.exp(-np.maximum(later - last, 0.0) / KEPT)
         angle = nominal[1] + (end[:, 1] - there[1]) * fades
+        angle = np.where(known, samples[:, 1], angle)
         off = np.where(self._loaded[end_point], end[:, 0] - there[0], 0.0)
-        free = self.observer.nominal.free_tension(angle) + now.offset[:, None]
-        tension = np.where(self._loaded[point], nominal[0] + off * fades, free)
-        found = np.stack([np.maximum(tension, 0.0), angle], axis=1)
-        return np.where(known[:, None], samples, found), np.ones_like(known)
+        free, offset = self.observer.nominal.free_tension(angle), now.offset[:, None]
+        tension = np.where(self._loaded[point], nominal[0] + off * fades, free + offset)
+        tension = np.where(known, samples[:, 0], np.maximum(tension, 0.0))
+        stance = np.abs(tension - free - offset) > SMALLEST
+        return np.stack([tension, angle], axis=1), stance
 
     @cached_property
     def _loaded(self) -> Rows:

@@ -99,21 +99,21 @@ class MachineCode:
 
     def __init__(self, source: Source) -> None:
         self._source = source
-        self._run: Run | None = None
+        self.run: Run | None = None  # the code, once it has been used in this process
         self._child: subprocess.Popen[bytes] | None = None
 
     def ready(self) -> Run | None:
         """Return the code, or None while a child process compiles it."""
-        if self._run is None:
-            self._run = self._stored()
-        if self._run is None and (waiting() or not self._in_background()):
-            self._run = load(self._compiled())
-        return self._run
+        if self.run is None:
+            self.run = self._stored()
+        if self.run is None and (waiting() or not self._in_background()):
+            self.run = load(self._compiled())
+        return self.run
 
     def wait(self) -> Run:
         """Return the code; wait until it is compiled if there is none."""
-        self._run = self._run or self._stored() or load(self._compiled())
-        return self._run
+        self.run = self.run or self._stored() or load(self._compiled())
+        return self.run
 
     def _stored(self) -> Run | None:
         """Return code that was shipped with the package or cached on this machine."""

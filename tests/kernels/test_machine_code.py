@@ -143,7 +143,9 @@ def test_steps_continue_in_plain_python_until_the_code_is_ready(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     name, asked = "PAM/MusclePositioning-v0", []
-    reference = trajectory(gym.make(name), 5, 130)
+    first = gym.make(name)
+    reference = trajectory(first, 5, 130)
+    monkeypatch.setattr(code_of(first), "run", None)
     real = MachineCode.ready
 
     def late(self: MachineCode) -> Any:
@@ -155,3 +157,17 @@ def test_steps_continue_in_plain_python_until_the_code_is_ready(
     assert trajectory(env, 5, 130) == reference
     assert len(asked) == 130 // plant_env.INTERPRETED_CALLS
     assert env.unwrapped._compiled  # type: ignore[attr-defined]
+
+
+def test_environment_starts_with_machine_code_that_another_one_uses() -> None:
+    name = "PAM/MusclePositioning-v0"
+    first = gym.make(name)
+    reference = trajectory(first, 5, 130)
+    assert code_of(first).run is not None
+    second = gym.make(name)
+    assert second.unwrapped._compiled  # type: ignore[attr-defined]
+    assert trajectory(second, 5, 130) == reference
+
+
+def code_of(env: Any) -> MachineCode:
+    return env.unwrapped.setup.kernels.single  # type: ignore[no-any-return]

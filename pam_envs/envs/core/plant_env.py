@@ -31,7 +31,10 @@ from pam_envs.kernels.random import seed_words
 from pam_envs.wording import shown
 
 INTERPRETED_CALLS = 50
-"""Steps in plain Python before an environment asks for machine code, and asks again."""
+"""Steps in plain Python before an environment asks for machine code, and asks again.
+
+One whose machine code another environment of this process uses starts with it.
+"""
 
 
 class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -63,8 +66,9 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._all: Any = None
         self._action_cells: Any = None
         self._outputs: tuple[Any, ...] = ()
-        self._warming = INTERPRETED_CALLS if COMPILED else 0
-        self._use(setup.kernels.interpreted, compiled=False)
+        run = setup.kernels.single.run if COMPILED else None
+        self._warming = INTERPRETED_CALLS if COMPILED and run is None else 0
+        self._use(run or setup.kernels.interpreted, compiled=run is not None)
 
     def _use(self, function: Any, compiled: bool) -> None:
         """Use ``function`` for all further steps: plain Python on lists, or machine code on arrays.
