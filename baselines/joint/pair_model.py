@@ -15,6 +15,7 @@ from scipy.linalg import expm, solve_discrete_are
 from baselines.predictive.regulator import regulated
 from pam_envs.arrays import Array
 from pam_envs.hysteresis.slip import SlipModel, slip_lag, slip_to
+from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import entry, kernel
 from pam_envs.mechanics.antagonistic_lever import SIDES
 from pam_envs.plants.antagonistic_joint.statics import PairPlant
@@ -164,8 +165,9 @@ def set_point_rows(
 @kernel
 def difference_after(both: Any, k: int, later: Any, lag: float, rate: float, time: float) -> float:
     """Return the difference [Pa] between the two pressures a time [s] after setpoint ``k``."""
-    a = regulated(later[0], both[0, k], lag, rate, time)
-    return a - regulated(later[1], both[1, k], lag, rate, time)
+    left = decay(time / lag)
+    a = regulated(later[0], both[0, k], lag, rate, time, left)
+    return a - regulated(later[1], both[1, k], lag, rate, time, left)
 
 
 @entry

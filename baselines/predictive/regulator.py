@@ -32,27 +32,47 @@ TRUST = 25.0
 
 
 @kernel
-def regulated(pressure: float, set_point: float, lag: float, rate: float, time: float) -> float:
-    """Return the pressure [Pa] after a time [s] under a setpoint: first-order lag, rate limit."""
+def regulated(
+    pressure: float, set_point: float, lag: float, rate: float, time: float, unlimited: float
+) -> float:
+    """Return the pressure [Pa] after a time [s] under a setpoint: first-order lag, rate limit.
+
+    ``unlimited`` is the share of a gap that is left after that time where the rate is no limit.
+    """
     if not time > 0.0:
         return pressure
     gap = set_point - pressure
     ramp = min(max(abs(gap) / rate - lag, 0.0), time)
-    left = (abs(gap) - rate * ramp) * decay((time - ramp) / lag)
+    left = abs(gap) - rate * ramp
+    if ramp == 0.0:
+        left *= unlimited
+    elif ramp < time:
+        left *= decay((time - ramp) / lag)
     return set_point - (left if gap > 0.0 else -left)
 
 
 @entry
+def decay_rows(ratios: Array, left: Array) -> None:
+    """Write the shares that are left after times over time constants."""
+    for m in range(len(ratios)):
+        left[m] = decay(ratios[m])
+
+
+@entry
 def advance_rows(
-    pressure: Array, commands: Array, whole: Any, part: Array, lag: Array, rate: Array,
-    period: float, after: Array,
+    pressure: Array, commands: Array, whole: Any, times: Array, left: Array, lag: Array,
+    rate: Array, after: Array,
 ) -> None:  # fmt: skip
-    """Write the pressures of all candidates one control period later, newest command first."""
+    """Write the pressures of all candidates one control period later, newest command first.
+
+    ``times``, shape (2, m), are those under the older and under the newer command [s], ``left`` the
+    shares of a gap that are left after them.
+    """
     for i in range(len(pressure)):
         for m in range(len(lag)):
-            older, newer, share = commands[i, whole[m] + 1], commands[i, whole[m]], part[m]
-            p = regulated(pressure[i, m], older, lag[m], rate[m], share * period)
-            after[i, m] = regulated(p, newer, lag[m], rate[m], (1.0 - share) * period)
+            older, newer = commands[i, whole[m] + 1], commands[i, whole[m]]
+            p = regulated(pressure[i, m], older, lag[m], rate[m], times[0, m], left[0, m])
+            after[i, m] = regulated(p, newer, lag[m], rate[m], times[1, m], left[1, m])
 
 
 @entry
@@ -66,7 +86,8 @@ def arrive_rows(
         for k in range(len(stages)):
             share = (1.0 if k > 0 else delay[i] - whole[i]) if k <= whole[i] else 0.0
             command = commands[i, max(whole[i] - k, 0)]
-            p = regulated(p, command, lag[i], rate[i], share * period)
+            time = share * period
+            p = regulated(p, command, lag[i], rate[i], time, decay(time / lag[i]))
             stages[k, i] = p
 
 
@@ -152,8 +173,13 @@ class RegulatorBank:
         return np.floor(self.dead_time / self.period + 1e-9).astype(np.int64)
 
     @cached_property
-    def _part(self) -> Array:
-        return self.dead_time / self.period - self._whole
+    def _laws(self) -> tuple[Array, Array]:
+        """Times under the older and the newer command [s], and the gaps left, (2, m)."""
+        part = self.dead_time / self.period - self._whole
+        times = np.stack([part, 1.0 - part]) * self.period
+        left = np.empty_like(times)
+        decay_rows((times / self.lag).ravel(), left.reshape(-1))
+        return times, left
 
     def start(self, set_point: Array) -> BankState:
         """Return the state at rest under setpoints [Pa], shape (n_env,)."""
@@ -182,8 +208,8 @@ class RegulatorBank:
         """Return the state one control period later, under setpoints [Pa], shape (n_env,)."""
         commands = np.concatenate([set_point[:, None], state.commands[:, :-1]], axis=1)
         pressure = np.empty_like(state.pressure, order="C")
-        before, laws = np.ascontiguousarray(state.pressure), (self.lag, self.rate, self.period)
-        advance_rows(before, commands, self._whole, self._part, *laws, pressure)
+        before, laws = np.ascontiguousarray(state.pressure), (*self._laws, self.lag, self.rate)
+        advance_rows(before, commands, self._whole, *laws, pressure)
         return BankState(pressure, state.deviation, commands)
 
     def best(self, state: BankState) -> NDArray[np.int64]:

@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import tee
 from typing import Any
 
 import numpy as np
@@ -286,15 +285,14 @@ def preview_used(episode: Episode, controller: Controller, signals: Any) -> floa
     if not ahead or not len(episode.observations):
         return 0.0
     seconds = {signal.index: signal.ahead for signal in signals}
-    plain = _answers(controller, episode.observations)
+    plain, _ = _timed(controller, episode.observations)
     for first in range(len(ahead), 0, -1):
         masked = episode.observations.copy()
         for number in range(first, len(ahead) + 1):
             for column, present in ahead[number]:
                 masked[:, column] = masked[:, present]
-        plain, again = tee(plain)
-        pairs = zip(again, _answers(controller, masked), strict=True)
-        if not all(np.array_equal(a, b, equal_nan=True) for (a, _), (b, _) in pairs):
+        pairs = zip(plain, _answers(controller, masked), strict=True)
+        if not all(np.array_equal(a, b, equal_nan=True) for a, (b, _) in pairs):
             return round(max(seconds[column] for column, _ in ahead[first]), 9)
     return 0.0
 
