@@ -140,11 +140,13 @@ class Held(NamedTuple):
 class Course(NamedTuple):
     """Plan of a gait at the times that a period needs.
 
-    Samples have the shape (n_env, 2, ...), what is in stance (n_env, ...): ``samples`` at the
-    nodes, ``soon`` ``EARLY`` after them, ``whole`` at control periods from the last one on, and
-    ``whole_stance`` there. ``stance``, ``begins`` and ``ended`` are the nodes, the times ``EARLY``
-    after and those ``LATE`` before them, ``past`` the last control periods, the newest first; they
-    are in stance if the planned samples on both sides are.
+    Samples have the shape (n_env, 2, n_times): ``samples`` at the nodes, ``soon`` at ``EARLY``
+    after them, ``whole`` at every control period from the last one on.
+
+    The others, shape (n_env, n_times), say what is in stance: ``whole_stance`` those periods,
+    ``stance`` the nodes, ``begins`` the times ``EARLY`` after them, ``ended`` those ``LATE`` before
+    them, ``past`` the last control periods, the newest first. All but the first require it of the
+    planned samples on both sides.
     """
 
     samples: Array
