@@ -15,6 +15,16 @@ so that ``z`` stays within -1 and 1. ``ratio = 1`` is the friction of Dahl (dahl
 ``ratio = 0`` the way back is that of a spring. The energy ``b z^2 / 2`` is stored, and the rest of
 the work, ``y^2`` or ``ratio y^2`` over the distance, is lost: with ``ratio >= 0`` nothing is
 created on any path (erlicher2004). Unlike those of play operators, minor loops are not closed.
+
+A ``tail`` from -1 to 1 sets how the friction approaches its largest value:
+
+    dy/du = (1 - y) (1 - tail y)                           where y >= 0
+    dy/du = (1 - ratio y) (1 - max(0, tail) ratio y)       where y <  0
+
+``tail = 0`` is the above, ``tail = 1`` with ``ratio = 1`` the friction of Dahl with exponent 2,
+whose approach is slow, and ``tail = -1`` on the way there that of Bouc and Wen with exponent 2,
+which is abrupt. The lost work is ``y^2 (1 + tail (1 - y))`` over the distance, and back at least
+``ratio y^2``: again, nothing is created.
 """
 
 from pam_envs.kernels.arithmetic import decay
@@ -91,6 +101,45 @@ def yielded(z: float, moved: float, ratio: float) -> tuple[float, float]:
     if left > 0.0:
         y = 1.0 - (1.0 - max(0.0, y)) * decay(left)
     return sign * y, 1.0 - (y if y >= 0.0 else ratio * y)
+
+
+@kernel
+def yielded_with_tail(z: float, moved: float, ratio: float, tail: float) -> tuple[float, float]:
+    """Return the share after a monotonic motion, and its slope, of a friction with a tail.
+
+    Parameters are those of :func:`yielded`, and the tail of the module. Both equations are solved
+    exactly: ``y / (1 - tail ratio y)`` and ``1 / (1 - y)`` obey linear ones.
+    """
+    sign, left = (1.0, moved) if moved >= 0.0 else (-1.0, -moved)
+    y = z * sign
+    slow = max(0.0, tail) * ratio
+    fade = ratio - slow
+    back = max(0.0, -y)
+    far = back / (1.0 + slow * back)
+    first = min(left, far * log_over(fade * far))  # to the change of sign, or to the end
+    near = max(0.0, far - (1.0 + fade * far) * first * decayed_over(fade * first))
+    y = max(0.0, y) - near / (1.0 - slow * near)
+    left = left - first
+    if left > 0.0:
+        rest, rate = 1.0 - max(0.0, y), 1.0 - tail
+        x = rate * left
+        gone = decay(x)
+        over = left * decayed_over(x) if x < 1.0 else (1.0 - gone) / rate
+        y = 1.0 - rest * gone / (1.0 + tail * rest * over)
+    slope = (1.0 - y) * (1.0 - tail * y) if y >= 0.0 else (1.0 - ratio * y) * (1.0 - slow * y)
+    return sign * y, slope
+
+
+@kernel
+def deflected_with_tail(
+    deflection: float, moved: float, limit: float, ratio: float, tail: float
+) -> tuple[float, float]:
+    """Return the same as :func:`deflected` for a friction with a tail."""
+    reach = max(SHORTEST, limit)
+    z, slope = yielded_with_tail(
+        max(-1.0, min(1.0, deflection / reach)), moved / reach, ratio, tail
+    )
+    return reach * z, slope
 
 
 @kernel

@@ -49,7 +49,7 @@ class ForceMap(LawCorrection, LengthYieldEffects, TemperatureEffects):
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
         *TemperatureEffects.effects,
-        tuple(declarations(LengthYieldEffects)),
+        (*declarations(LengthYieldEffects), "yield_tail"),
         FIELDS,
         ("friction_imbalance",),
     )
@@ -83,6 +83,9 @@ class ForceMap(LawCorrection, LengthYieldEffects, TemperatureEffects):
     )
     friction_imbalance: float = effect(
         "1", -0.9, 0.9, "share by which A has more friction and B less"
+    )
+    yield_tail: float = effect(
+        "1", -1.0, 1.0, "approach of the yielding friction to its limit: -1 abrupt, 1 slow"
     )
     viscosity: float = derived(
         1.2e-4,

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pam_envs.kernels.yielding import deflected
+from pam_envs.kernels.yielding import deflected_with_tail, yielded, yielded_with_tail
 from pam_envs.muscle.law_correction import FIELDS, NAMES, correction_force, correction_slope
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
@@ -19,6 +19,7 @@ YIELDING = {
     "muscle.yield_per_pressure": 1e-5,
     "muscle.yield_break": 0.003,
     "muscle.yield_ratio": 0.4,
+    "muscle.yield_tail": 0.7,
 }
 CYCLE, BEGUN = 720, 100
 """Control periods of a cycle of pressures, and of the way to its first pressure."""
@@ -45,6 +46,37 @@ def test_joint_settles_where_the_corrected_torques_balance_the_weight():
     assert abs(angle - plain) > 1e-3
     missing = float(plant.torque(angle, 3e5, 1.5e5)) - float(plant.weight_torque(angle, 0.0))
     assert missing == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("tail", [-1.0, -0.4, 0.0, 0.3, 1.0])
+@pytest.mark.parametrize("ratio", [0.0, 0.6, 1.0])
+@pytest.mark.parametrize("start", [-1.0, -0.3, 0.5, 1.0])
+def test_friction_with_a_tail_solves_its_equation_and_creates_no_energy(tail, ratio, start):
+    """Against a midpoint rule; ``y`` is the share along the motion."""
+    way, steps = 3.0, 6000
+
+    def rate(y):
+        along = (1.0 - y) * (1.0 - tail * y)
+        return along if y >= 0.0 else (1.0 - ratio * y) * (1.0 - max(0.0, tail) * ratio * y)
+
+    y, work, far = start, 0.0, way / steps
+    for k in range(steps):
+        middle = y + 0.5 * far * rate(y)
+        y, work = y + far * rate(middle), work + far * middle
+        if k + 1 in (steps // 10, steps):
+            for sign in (1.0, -1.0):
+                moved = sign * far * (k + 1)
+                z, slope = yielded_with_tail(sign * start, moved, ratio, tail)
+                assert z == pytest.approx(sign * y, abs=2e-6)
+                assert slope == pytest.approx(rate(y), abs=1e-5)
+    assert work - 0.5 * (y * y - start * start) > -1e-6
+
+
+def test_friction_with_a_tail_is_that_of_dahl_or_bouc_and_wen():
+    for moved in (0.1, 1.0, 20.0, -0.4):
+        assert yielded_with_tail(0.2, moved, 0.4, 0.0) == pytest.approx(yielded(0.2, moved, 0.4))
+    assert yielded_with_tail(-1.0, 2.0, 1.0, 1.0)[0] == pytest.approx(1.0 - 2.0 / (1.0 + 2.0 * 2.0))
+    assert yielded_with_tail(0.0, 0.7, 1.0, -1.0)[0] == pytest.approx(np.tanh(0.7), rel=1e-9)
 
 
 @pytest.fixture(scope="module", params=["none", "maxwell_slip", "maxwell_slip_length"])
@@ -92,7 +124,8 @@ def test_yielding_friction_of_each_muscle_follows_its_contraction(cycles):
         at, before = 0.0, straight
         for t, (p, e) in enumerate(zip(pressure[m], strain[m], strict=True)):
             most = (law.yield_force + law.yield_per_pressure * p) / stiff
-            at, before = deflected(at, e - before, most, law.yield_ratio)[0], e
+            shape = most, law.yield_ratio, law.yield_tail
+            at, before = deflected_with_tail(at, e - before, *shape)[0], e
             expected[m, t] = stiff * at
     found = friction - friction_of_elements(plant, pressure, strain)
     assert np.abs(expected).max() > 7.0
@@ -113,7 +146,7 @@ def test_yielding_friction_turns_with_the_motion_and_reaches_its_limit(cycles):
             span = limit[m, first:last].max() / law.yield_force * law.yield_break
             if abs(way) > 5.0 * span:
                 reached = np.sign(way) * found[m, first:last] / limit[m, first:last]
-                assert reached[0] < 0.0 and reached.max() > 0.95
+                assert reached[0] < 0.0 and reached.max() > 0.85
                 sides.add(np.sign(way))
         assert sides == {-1.0, 1.0}
 

@@ -45,14 +45,18 @@ def with_correction(
     return tuple(corrected if cause.name == law.name else cause for cause in causes)
 
 
+TAIL = Term("muscle.yield_tail", (0.0,), scale=0.3, amount=False, prior=3.0)
+"""How yielding friction approaches its largest value."""
+
+
 def with_yielding(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     """Return causes whose shape of the loops is friction of the length that yields smoothly.
 
-    For plants whose friction is driven by length anyway.
+    For plants whose friction is driven by length anyway, and has a tail.
     """
     shape, drive = by_name("hysteresis_shape"), by_name("hysteresis_drive")
     form = next(form for form in drive.forms if form.name == "yielding")
-    made = replace(shape, forms=(form,))
+    made = replace(shape, forms=(replace(form, terms=(*form.terms, TAIL)),))
     kept = (cause for cause in causes if cause.name != drive.name)
     return tuple(made if cause.name == shape.name else cause for cause in kept)
 

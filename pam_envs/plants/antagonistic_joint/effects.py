@@ -9,7 +9,7 @@ from typing import Any
 
 from pam_envs.constants import DENSITY_PER_PRESSURE
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.kernels.yielding import deflected
+from pam_envs.kernels.yielding import deflected_with_tail
 from pam_envs.muscle.effects import LengthYieldEffects, yield_spring
 from pam_envs.muscle.law_correction import correction_force, correction_slope
 from pam_envs.parameters import declarations
@@ -107,7 +107,8 @@ def yield_of(rows: Any, fixed: Any, j: int, m: int) -> tuple[float, float]:
     """
     _, limit = yield_spring(fixed, j, PAIR.soft, rows[PAIR.effective + m][j])
     moved = rows[PAIR.at + m][j] - rows[PAIR.yielded + m][j]
-    return deflected(rows[PAIR.deflection + m][j], moved, limit, fixed[PAIR.soft + RATIO][j])  # type: ignore[no-any-return]
+    ratio, tail = fixed[PAIR.soft + RATIO][j], fixed[PAIR.uneven + 1][j]
+    return deflected_with_tail(rows[PAIR.deflection + m][j], moved, limit, ratio, tail)  # type: ignore[no-any-return]
 
 
 @kernel

@@ -51,14 +51,14 @@ def path_effects(
 
     ``muscles`` are the components that have a temperature each (see ``core.muscle_path``), ``law``
     is that with the correction of the static law, ``yields`` that with yielding friction, ``pair``
-    that of muscles in pairs, whose friction may differ.
+    that of muscles in pairs, whose friction may differ and have a tail.
     """
     rubs = {"bearing": dotted(**{bearing: " ".join(GUIDE._fields)})} if bearing else {}
     warm = {"warm": dotted(**dict.fromkeys(muscles, " ".join(WARM._fields)))}
     shown = {sensor: dotted(**{sensor: " ".join(SENSOR._fields)}) for sensor in sensors}
     maps = {"law": dotted(**{law: " ".join(FIELDS)})} if law else {}
     soft = {"soft": dotted(**{yields: " ".join(YIELD_FIELDS)})} if yields else {}
-    uneven = {"uneven": dotted(**{pair: "friction_imbalance"})} if pair else {}
+    uneven = {"uneven": dotted(**{pair: "friction_imbalance yield_tail"})} if pair else {}
     return {"path": PATH_NAMES} | warm | rubs | shown | maps | soft | uneven
 
 
