@@ -390,6 +390,7 @@ class Study:
             self.rule,
             self.seed,
             self.unseen,
+            self.base,
         )
         if self.decision.level and any(cause.common for cause, _ in self.model.causes):
             self.decision.model = self.flexible.needed(self.decision.model)

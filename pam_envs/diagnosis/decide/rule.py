@@ -14,7 +14,7 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "8"  # part of every report
+    version: str = "9"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     # the same on a rig whose law or friction differs from the base: a smaller gain may correct what
@@ -71,11 +71,16 @@ LITTLE = 0.3
 
 @dataclass(frozen=True)
 class Judgement:
-    """A verdict on plain evidence: number of causes, and the rivals that are not excluded."""
+    """A verdict on plain evidence.
+
+    Number of causes, the rivals that are not excluded, and whether a fault of the base is named
+    beside structure that no cause explains.
+    """
 
     verdict: str
     level: int
     open_rivals: tuple[int, ...] = ()
+    incomplete: bool = False
 
 
 def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
@@ -85,7 +90,9 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
     if evidence.get("differs", False):
         least = max(least, rule.differing_gain)
     if len(levels) < 2 or not is_accepted(levels[1], least, rule):
-        return Judgement("unexplained" if has_structure(levels[0]["left"], rule) else "adequate", 0)
+        if has_structure(levels[0]["left"], rule):
+            return unexplained(evidence, 0, rule)
+        return Judgement("adequate", 0)
     level, first = 1, levels[1]["gain"]
     while level + 1 < len(levels) and level < rule.most:
         required = max(least, required_gain(first, levels[level + 1]["possible"], rule))
@@ -100,9 +107,31 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
         if explained_fraction(levels[0], found) < (
             rule.explained_with_peak if lasts else rule.explained
         ) or is_lost(levels[0], found, evidence.get("driving", ()), rule):
-            return Judgement("unexplained", level)
+            return unexplained(evidence, level, rule)
     still = not_excluded(found["rivals"], rule)
     return Judgement("ambiguous" if still else "named", level, still)
+
+
+def unexplained(evidence: Mapping[str, Any], level: int, rule: Rule) -> Judgement:
+    """Return the verdict where structure remains: a fault of the base is named if it is shown."""
+    if any(is_shown(fault, rule) for fault in evidence.get("faults", ())):
+        return Judgement("named", 0, incomplete=True)
+    return Judgement("unexplained", level)
+
+
+def is_shown(fault: Mapping[str, Any], rule: Rule) -> bool:
+    """Return whether a fault of the base explains a large share that no other cause does.
+
+    It needs the gain of a difference beside another law, a significant one, and most of the mean
+    square above the noise without it; every other cause in its place gains clearly less.
+    """
+    return bool(
+        fault["gain"] >= rule.lawlike_further
+        and fault["unsure"] <= rule.doubt
+        and explained_fraction({"left": fault["without"]}, {"left": fault["left"]})
+        >= rule.explained
+        and fault["rival"] < rule.close * fault["gain"]
+    )
 
 
 def oscillates_still(before: Mapping[str, Any], after: Mapping[str, Any], rule: Rule) -> bool:

@@ -43,6 +43,7 @@ class Decision:
     open_rivals: list[Candidate] = field(default_factory=list)  # those that are not excluded
     evidence: dict[str, Any] = field(default_factory=dict)  # see Ladder.evidence
     level: int = 0  # number of causes beside the differences of the base
+    incomplete: bool = False  # whether a named fault leaves structure that no cause explains
 
 
 def remaining_structure(
@@ -173,6 +174,41 @@ class Ladder:
             if term.amount
         )
 
+    def faults(self, plain: Candidate) -> list[dict[str, Any]]:
+        """Return the evidence on each common difference of the base that is a fault.
+
+        A difference by nature is none, nor one that is like another law. ``plain`` is the base
+        without differences. For each fault: its ``name``, its ``gain``, the p-value (``unsure``)
+        and the mean squares by channel of a base refitted without it (``without``) and of the base
+        (``left``), and the gain of the best other cause in its place (``rival``).
+        """
+        names = {c.name for c, _ in self.base.causes if not (c.by_nature or c.lawlike)}
+        smaller = without_each_cause(self.problem, self.blocks, plain, self.base, names)
+        made = []
+        for name, less in smaller.items():
+            others = [c for c in self.causes if c.name != name]
+            screen = Screen.make(self.problem, self.family, less.fit, others)
+            found = search(self.problem, self.family, self.blocks, less, others, screen)
+            made.append(
+                {
+                    "name": name,
+                    "gain": self.gain(self.base, less),
+                    "unsure": compare.p_value(
+                        self.problem, self.blocks, less, self.base, len(found) + 1
+                    ),
+                    "without": {"by_channel": self._means(less)},
+                    "left": {"by_channel": self._means(self.base)},
+                    "rival": max((self.gain(c, less) for c in found), default=0.0),
+                }
+            )
+        return made
+
+    def _means(self, model: Candidate) -> list[float]:
+        """Return the held-out mean square over the noise by channel, 0 without readings."""
+        some = self.blocks.counts.sum(axis=1) > 0
+        means = self.blocks.means(model.errors)
+        return [float(v) if s else 0.0 for v, s in zip(means, some, strict=True)]
+
     def evidence(self, levels: Sequence[Level]) -> dict[str, Any]:
         """Return the input of the rule, in plain types.
 
@@ -274,10 +310,12 @@ def decide(
     rule: Rule,
     seed: int = 0,
     unseen: Sequence[Cause] = (),
+    plain: Candidate | None = None,
 ) -> Decision:
     """Search for causes, add further ones while they are accepted, and give the verdict.
 
-    ``unseen`` are causes that lack their experiment: rivals that are never named.
+    ``unseen`` are causes that lack their experiment: rivals that are never named. ``plain`` is the
+    base without the common differences, if it has any.
     """
     ladder = Ladder(
         problem,
@@ -297,13 +335,18 @@ def decide(
     if judged.verdict == "ambiguous":
         ladder.cross_validate(levels, judged, evidence)
         judged = judge(evidence, rule)
+    if judged.verdict == "unexplained" and plain is not None:
+        evidence["faults"] = ladder.faults(plain)
+        judged = judge(evidence, rule)
     selected = levels[judged.level]
     rivals = selected.rivals if judged.level else levels[min(1, len(levels) - 1)].rivals
     still = [rivals[k] for k in judged.open_rivals]
     verdict = judged.verdict
     if verdict == "adequate" and base.causes:
         verdict = "named"
-    return Decision(verdict, selected.model, rivals, still, evidence, judged.level)
+    return Decision(
+        verdict, selected.model, rivals, still, evidence, judged.level, judged.incomplete
+    )
 
 
 def effect_traces(problem: Problem, family: PlantFamily, model: Candidate) -> dict[str, Array]:

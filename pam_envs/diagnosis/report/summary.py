@@ -67,7 +67,9 @@ def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, An
             "seed": held.seed,
         },
     }
-    report["incomplete"] = decision.verdict == "named" and _incomplete(report)
+    report["incomplete"] = decision.verdict == "named" and (
+        decision.incomplete or _incomplete(report)
+    )
     report["text"] = sentence(report, rule)
     return report
 
@@ -230,7 +232,8 @@ def _share_text(report: Report) -> str:
         text += f", black box {e['black_box']:.3g})."
     if report.get("incomplete"):
         rest = {n for e in report["explained"].values() for n in e["depends_on"]}
-        text += " The cause is incomplete: an error far above noise and black box remains"
+        text += " The cause is incomplete: an error above the noise remains that no candidate "
+        text += "explains"
         words = enumeration([n.replace("_", " ") for n in sorted(rest)])
         text += f", which varies with {words}." if rest else "."
     return text

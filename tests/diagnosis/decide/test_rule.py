@@ -92,6 +92,41 @@ def test_a_rig_that_differs_from_the_base_requires_a_larger_gain(gain, differs, 
     assert judge(found, RULE).verdict == verdict
 
 
+FAULT = {
+    "name": "unequal_muscles",
+    "gain": 2.0,
+    "unsure": 0.0,
+    "without": {"by_channel": [40.0, 1.0]},
+    "left": {"by_channel": [9.0, 1.0]},
+    "rival": 0.4,
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({}, True),
+        ({"gain": 0.9, "rival": 0.1}, False),  # as another law may gain
+        ({"unsure": 0.2}, False),
+        ({"left": {"by_channel": [25.0, 1.0]}}, False),  # less than half of what was missing
+        ({"rival": 1.7}, False),  # another cause in its place does as well
+    ],
+)
+@pytest.mark.parametrize("further", [(), (level(0.35, WEAK, left=left(excess=9.0)),)])
+def test_a_fault_of_the_base_is_named_incomplete_if_it_explains_much_alone(change, named, further):
+    found = evidence(*further, before=left(excess=9.0)) | {"faults": [FAULT | change]}
+    judged = judge(found, RULE)
+    assert judged.verdict == ("named" if named else "unexplained")
+    assert judged.incomplete == named
+    assert judged.level == (0 if named or not further else 1)
+    assert judge({**found, "faults": []}, RULE).verdict == "unexplained"
+
+
+def test_a_fault_of_the_base_is_complete_where_nothing_remains():
+    judged = judge(evidence() | {"faults": [FAULT]}, RULE)
+    assert (judged.verdict, judged.incomplete) == ("adequate", False)
+
+
 @pytest.mark.parametrize(("added", "number"), [(0.7, 1), (1.2, 2)])
 def test_a_further_cause_like_another_law_requires_a_larger_gain(added, number):
     further = level(3.0 + added, BOTH, added=added, lawlike=True)

@@ -77,6 +77,18 @@ def test_every_cause_moves_a_parameter_of_the_plant(name):
     assert len({c.name for c in causes}) == len(causes)
 
 
+def test_only_muscles_in_pairs_have_a_fault_among_their_common_differences():
+    """It may be named beside structure that remains; every other kind of plant is left alone."""
+    found = {}
+    for name in KINDS:
+        kind = kind_named(name)
+        common = [cause for cause in kind.causes(kind.catalogue) if cause.common]
+        found[name] = {c.name for c in common if not (c.by_nature or c.lawlike)}
+    pairs = {"antagonistic_joint", "redundant_manipulator"}
+    assert {name for name, faults in found.items() if faults} == pairs
+    assert set.union(*found.values()) == {"unequal_muscles"}
+
+
 def test_sensor_causes_of_a_knee_have_forms_of_angle_and_tension():
     kind = kind_named("knee_orthosis")
     delay = next(c for c in kind.causes(kind.catalogue) if c.name == "sensor_delay")
