@@ -49,14 +49,15 @@ TAIL = Term("muscle.yield_tail", (0.0,), scale=0.3, amount=False, prior=3.0)
 """How yielding friction approaches its largest value."""
 
 
-def with_yielding(causes: Sequence[Cause]) -> tuple[Cause, ...]:
+def with_yielding(causes: Sequence[Cause], further: Sequence[Term] = ()) -> tuple[Cause, ...]:
     """Return causes whose shape of the loops is friction of the length that yields smoothly.
 
-    For plants whose friction is driven by length anyway, and has a tail.
+    For plants whose friction is driven by length anyway; ``further`` are terms of the friction
+    beside those of the catalogue.
     """
     shape, drive = by_name("hysteresis_shape"), by_name("hysteresis_drive")
     form = next(form for form in drive.forms if form.name == "yielding")
-    made = replace(shape, forms=(replace(form, terms=(*form.terms, TAIL)),))
+    made = replace(shape, forms=(replace(form, terms=(*form.terms, *further)),))
     kept = (cause for cause in causes if cause.name != drive.name)
     return tuple(made if cause.name == shape.name else cause for cause in kept)
 
