@@ -14,7 +14,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from sweeps.worker import Act, Done, Task, begin, do
+from sweeps.worker import Act, Done, Task, do, end_with
 
 ATTEMPTS = 3  # attempts at a task whose process dies
 
@@ -49,7 +49,7 @@ def _round(act: Act, tasks: Mapping[str, Task], jobs: int, started: list[str]) -
             started.append(key)
             yield delayed(do)(act, task, key)
 
-    driver = {"initializer": begin, "initargs": (os.getpid(),)}
+    driver = {"initializer": end_with, "initargs": (os.getpid(),)}
     with parallel_config("loky", inner_max_num_threads=1, **driver):
         # one task at a time per process, so that few are repeated when one dies
         parallel = Parallel(jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs)

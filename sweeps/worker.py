@@ -86,18 +86,8 @@ def is_needed() -> bool:
     return held is not None and held.state not in ("cancelled", "released", "forgotten")
 
 
-MEMORY = 2_000_000_000
-"""Growth [bytes] from which loky takes a process for one that leaks, and starts another.
-
-A process keeps the machine code of all environments that it has run: half a gigabyte.
-"""
-
-
-def begin(driver: int) -> None:
-    """Let this process grow, and end it when its driver has ended; loky calls this at its start."""
-    from joblib.externals.loky import process_executor
-
-    process_executor._MAX_MEMORY_LEAK_SIZE = MEMORY  # loky has no public setting
+def end_with(driver: int) -> None:
+    """End this process when its driver has ended; loky calls this when it starts a process."""
     threading.Thread(target=_watch, args=(driver,), daemon=True).start()
 
 

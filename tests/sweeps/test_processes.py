@@ -5,7 +5,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from joblib.externals.loky import get_reusable_executor, process_executor
+from joblib.externals.loky import get_reusable_executor
 
 from sweeps import worker
 from sweeps.engine import Cluster, run
@@ -38,10 +38,6 @@ def test_results_are_those_of_one_process(tmp_path):
     apart = list(run(square, tasks, TWO))
     assert sorted(apart, key=lambda done: done.key) == here
     assert [task.begins() for task in tasks] == [2] * 7  # an error is no reason to try again
-
-
-def test_loky_has_the_limit_of_memory_that_workers_raise():
-    assert 0 < process_executor._MAX_MEMORY_LEAK_SIZE < worker.MEMORY
 
 
 def test_killed_worker_loses_no_result(tmp_path):
