@@ -91,9 +91,9 @@ def millions(count: float | None) -> str:
     return "-" if count is None else f"{count / 1e6:.3g} M"
 
 
-def table(heading: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of a Markdown table; columns of words to the left."""
-    rule = [":--" if name in LEFT else "--:" for name in heading]
+def table(heading: Sequence[str], lines: Sequence[Sequence[str]], words: bool = False) -> list[str]:
+    """Return the lines of a Markdown table; columns of words to the left, with ``words`` all."""
+    rule = [":--" if words or name in LEFT else "--:" for name in heading]
     return [_line(heading), _line(rule), *(_line(line) for line in lines)]
 
 

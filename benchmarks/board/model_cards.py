@@ -14,7 +14,7 @@ from agents.policies import catalogue
 from agents.policies.policy_file import read, record_of
 from agents.settings import presets
 from benchmarks.board import accessors as views
-from benchmarks.board.format import duration, millions, number
+from benchmarks.board.format import duration, millions, number, table
 from benchmarks.board.leaderboard import load
 from benchmarks.board.words import score_words, short_env
 from benchmarks.runs import rows
@@ -66,7 +66,7 @@ def card_text(name: str, entry: catalogue.Entry, own: Sequence[Row]) -> str:
         "",
         f"{entry.summary}.",
         "",
-        *_table(["", ""], _facts(name, entry, first, own)),
+        *table(["", ""], _facts(name, entry, first, own), words=True),
         "",
         "## Files",
         "",
@@ -125,11 +125,6 @@ def _arguments(kwargs: Mapping[str, Any]) -> str:
     return ", ".join(f"`{name}={value!r}`" for name, value in kwargs.items())
 
 
-def _table(heading: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of a Markdown table with columns to the left."""
-    return [f"| {' | '.join(line)} |" for line in (heading, [":--"] * len(heading), *lines)]
-
-
 def _unit(env: str) -> str:
     """Return the SI unit of the tracked output of an environment."""
     track = next(track for track in scenarios.available().values() if track.env == env)
@@ -152,7 +147,7 @@ def _files(
                 duration(record["training"]["seconds"]),
             ]
         )
-    return _table(heading, lines)
+    return table(heading, lines, words=True)
 
 
 def _signals(entry: catalogue.Entry, card: Mapping[str, Any]) -> list[str]:
@@ -165,7 +160,7 @@ def _signals(entry: catalogue.Entry, card: Mapping[str, Any]) -> list[str]:
     if entry.baseline:
         more = f" The policy also reads the action of `{entry.baseline}`, and corrects it."
     return [
-        *_table(["", "signal", "unit", "range in [-1, 1]", "ahead"], lines),
+        *table(["", "signal", "unit", "range in [-1, 1]", "ahead"], lines, words=True),
         "",
         f"All values are float32, scaled from their range to [-1, 1].{more}",
     ]
@@ -212,7 +207,7 @@ def _scores(name: str, env: str, own: Sequence[Row]) -> list[str]:
         f"RMS error with 95 % interval, as on the [leaderboard]({BOARD}/{env}.md); "
         "`python -m benchmarks verify ROW` computes a row again.",
         "",
-        *_table(["row", "score", "failed episodes", "episodes"], lines),
+        *table(["row", "score", "failed episodes", "episodes"], lines, words=True),
     ]
 
 
