@@ -39,9 +39,7 @@ $(READY): pyproject.toml constraints.txt
 venv: $(READY) ## Make .venv with everything
 
 benchmark: $(READY) ## Score every controller and write the leaderboard
-	$(BIN)/python -m benchmarks run
-	$(BIN)/python -m benchmarks board
-	$(BIN)/python -m benchmarks cards
+	$(BIN)/python -m benchmarks run --pages
 
 test: $(READY) ## Run the tests: a part without the compiler, then all
 ifneq ($(PLAIN),)

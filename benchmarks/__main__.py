@@ -46,6 +46,7 @@ def run(
     controller: tuple[str, ...] = (),
     track: tuple[str, ...] = (),
     dry_run: bool = False,
+    pages: bool = False,
     options: Options = OPTIONS,
 ) -> int:
     """Run controllers in the scenarios, one file per row; an interrupted run resumes.
@@ -55,6 +56,8 @@ def run(
         controller: Names of controllers; all by default.
         track: Names of scenario files, or paths of such files; all files by default.
         dry_run: Only list the cells and whether they are stored.
+        pages: If all rows could be computed, also write the leaderboard, and the model cards from
+            rows in benchmarks/results.
     """
     from benchmarks import console
 
@@ -75,7 +78,12 @@ def run(
     print(f"checking the cells of {len(pairs)} rows", file=sys.stderr)
     with progress("cells") as start:
         report = runner.run(pairs, options, start)
-    return console.run(report)
+    incomplete = console.run(report)
+    if pages and not incomplete:
+        board(options.out)
+        if options.out == rows.RESULTS:
+            cards()
+    return incomplete
 
 
 def audit(

@@ -198,6 +198,19 @@ def test_exit_code_and_message_state_the_kind_of_failure(ask, monkeypatch, capsy
     assert "0 cells computed, 2 were there already" in capsys.readouterr().out
 
 
+def test_leaderboard_is_written_after_a_complete_run(ask, folder, monkeypatch):
+    def wrong(*_: object) -> None:
+        raise ArithmeticError("no number")
+
+    board = folder / "out" / "LEADERBOARD.md"
+    with monkeypatch.context() as patch:
+        patch.setattr(cells, "compute", wrong)
+        assert ask("--pages") == 1
+    assert not board.exists()
+    assert ask("--pages") == 0
+    assert any("`low`" in page.read_text() for page in board.parent.rglob("*.md"))
+
+
 def test_closed_output_is_no_error():
     command = [sys.executable, "-m", "benchmarks", "cite", "positioning_nominal--inverse"]
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
