@@ -63,3 +63,8 @@ def install() -> None:
     inside = any((PACKAGE / folder).exists() for folder in FOLDERS)
     if beside and not inside and not any(isinstance(one, Aliases) for one in sys.meta_path):
         sys.meta_path.insert(0, Aliases())
+
+
+def catalogue() -> ModuleType:
+    """Return the module of the controllers, loaded on use, since it builds on this package."""
+    return import_module(f"{PACKAGE.name}.baselines.core.catalogue")

@@ -113,7 +113,7 @@ def delayed(system: StateSpace, dead_time: float, period: float) -> DiscreteSyst
     a, b = np.zeros((size, size)), np.zeros(size)
     a[:-n, :-n] = after @ older.A  # type: ignore[union-attr]
     a[:-n, -n] = (after @ older.B)[:, 0]  # type: ignore[union-attr]
-    a[-n:-1, -n + 1 :] = np.eye(n - 1)
+    a[-n:-1, size - n + 1 :] = np.eye(n - 1)
     b[-1] = 1.0
     if newer is not None and n > 1:
         a[:-n, -n + 1] = newer.B[:, 0]

@@ -17,6 +17,7 @@ from pam_envs.diagnosis.audit.noise import ChannelFloor, Floor, noise_floor
 from pam_envs.diagnosis.cause import Cause, Form
 from pam_envs.diagnosis.causes import selected
 from pam_envs.diagnosis.closed_loop import gain as loops
+from pam_envs.diagnosis.closed_loop import in_environment
 from pam_envs.diagnosis.decide import isolability as iso
 from pam_envs.diagnosis.decide.flexible_base import FlexibleBase, shapes_of
 from pam_envs.diagnosis.decide.held_out import HeldOut, choose, compared, hold_out, interleaved
@@ -79,7 +80,9 @@ def diagnose(
         Known properties of the rig; see :class:`pam_envs.data.rig_file.Rig`.
     design : callable, optional
         From a plant to a controller, for the comparison in closed loop
-        (:mod:`pam_envs.diagnosis.closed_loop.gain`).
+        (:mod:`pam_envs.diagnosis.closed_loop.gain`); for plants other than a single muscle from a
+        plant and the signals of the environment
+        (:data:`pam_envs.diagnosis.closed_loop.in_environment.Design`).
     causes : sequence of Cause or str, optional
         Causes, or names of shipped ones; :func:`pam_envs.diagnosis.causes.causes_in` reads those
         of a folder. Default: :func:`pam_envs.diagnosis.causes.catalogue`.
@@ -437,6 +440,13 @@ class Study:
         """Compare controllers designed on the base and on the extended plant."""
         self.loop_reason = self._no_loop()
         if self.loop_reason is not None:
+            return
+        if self.kind.loop is not None:
+            plants = self.plant_of(self.base), self.plant_of(self.model)
+            self.loop, reason = in_environment.compare(
+                self.kind.loop, *plants, design, oracle, self.seed
+            )
+            self.loop_reason = reason or None
             return
         held = self.held
         residuals = None

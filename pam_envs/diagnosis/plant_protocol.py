@@ -72,6 +72,29 @@ class Signals:
         return (self.label, self.outputs[1] / self.scale) if self.label else None
 
 
+@dataclass(frozen=True)
+class Loop:
+    """Closed loop in which controllers of a family are compared.
+
+    Attributes
+    ----------
+    env : str
+        Id of an environment of the family.
+    controller : str
+        Name of the paper's controller in the catalogue.
+    unit, scale : str and float
+        Unit of the tracking error in reports, and its size [SI].
+    reference : str, optional
+        Argument of the environment; None: its default.
+    """
+
+    env: str
+    controller: str
+    unit: str
+    scale: float
+    reference: str | None = None
+
+
 class Parameter(Protocol):
     """Declaration of a parameter (:class:`pam_envs.parameters.Declaration`)."""
 
@@ -174,6 +197,10 @@ class Kind(Protocol):
     @property
     def experiments(self) -> bool:
         """Whether there are plans of further experiments."""
+
+    @property
+    def loop(self) -> Loop | None:
+        """Closed loop of the family; None: that of a single muscle."""
 
     @property
     def loop_reason(self) -> str:

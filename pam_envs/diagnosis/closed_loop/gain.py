@@ -212,32 +212,40 @@ def closed_loop(
         ]
     )
     found = scores(squares, list(references), seed)
-    name = str(getattr(make, "__name__", type(make).__name__)).replace("_", " ")
-    found["controller"] = "inverse by simulation with a PI loop" if design is None else name
+    found["controller"] = INVERSE if design is None else name_of(design)
     found["where"] = "the rig" if rig is not None else REPLAYED if residuals else NOISY
     return {**found, "text": sentence(found)}
 
 
+def name_of(design: Callable[..., Any]) -> str:
+    """Return the name of a design routine in words."""
+    return str(getattr(design, "__name__", type(design).__name__)).replace("_", " ")
+
+
+INVERSE = "inverse by simulation with a PI loop"
 REPLAYED = "the extended plant with held-out residuals added"
 NOISY = "the extended plant with its sensor noise"
 
 
-def scores(squares: Array, names: list[str], seed: int) -> dict[str, Any]:
+def scores(
+    squares: Array, names: list[str], seed: int, unit: str = "mm", scale: float = 1.0 / MM
+) -> dict[str, Any]:
     """Return errors and improvement with confidence intervals from a segment bootstrap.
 
-    ``squares`` [m2] are of before, after and the oracle, shape (2 or 3, references, segments).
+    ``squares``, squares of SI units, are of before, after and the oracle, shape
+    (2 or 3, references, segments); ``scale`` is the size of the unit [SI].
     """
     flat = squares.reshape(len(squares), -1)
     rng = np.random.default_rng(seed)
-    drawn = rms(flat[:, rng.integers(0, flat.shape[1], (DRAWS, flat.shape[1]))]) * MM
-    old, new, *best = (rms(flat) * MM).tolist()
+    drawn = rms(flat[:, rng.integers(0, flat.shape[1], (DRAWS, flat.shape[1]))]) / scale
+    old, new, *best = (rms(flat) / scale).tolist()
     gap = old - best[0] if best else 0.0
-    each = rms(squares) * MM
+    each = rms(squares) / scale
     labels = ("before", "after", "oracle")[: len(squares)]
     return {
         "controller": "",
         "where": "",
-        "unit": "mm",
+        "unit": unit,
         "before": {"value": old, "interval": spread(drawn[0])},
         "after": {"value": new, "interval": spread(drawn[1])},
         "oracle": {"value": best[0]} if best else None,
@@ -255,11 +263,11 @@ def scores(squares: Array, names: list[str], seed: int) -> dict[str, Any]:
 
 def sentence(found: Mapping[str, Any]) -> str:
     """Return the result in words."""
-    old, new = found["before"]["value"], found["after"]["value"]
+    old, new, unit = found["before"]["value"], found["after"]["value"], found["unit"]
     better, (low, high) = found["better_percent"]["value"], found["better_percent"]["interval"]
     text = (
         "Designed on the extended plant instead of the plant before, the same controller has a "
-        f"tracking error of {new:.3g} instead of {old:.3g} mm RMS on {found['where']}: "
+        f"tracking error of {new:.3g} instead of {old:.3g} {unit} RMS on {found['where']}: "
     )
     if low <= 0.0 <= high:
         text += f"no significant difference ({low:.0f} to {high:.0f} %)."
@@ -268,7 +276,7 @@ def sentence(found: Mapping[str, Any]) -> str:
         ends = sorted((abs(low), abs(high)))
         text += f"{abs(better):.0f} % {word} (95 % interval {ends[0]:.0f} to {ends[1]:.0f} %)."
     if found["oracle"] is not None:
-        text += f" Designed on the rig itself the error is {found['oracle']['value']:.3g} mm"
+        text += f" Designed on the rig itself the error is {found['oracle']['value']:.3g} {unit}"
         share = found["recovered"]
         text += "." if share is None else f"; {100.0 * share:.0f} % of that gap is closed."
     return text

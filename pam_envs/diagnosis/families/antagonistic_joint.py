@@ -19,7 +19,7 @@ from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.pair_balance import PairBalance
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
 from pam_envs.diagnosis.fit.single_muscle import grouped
-from pam_envs.diagnosis.plant_protocol import Signals
+from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.antagonistic_joint.hysteresis import REFERENCE_PRESSURE
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import FROM_THEM
@@ -210,6 +210,7 @@ class JointKind(RegulatedKind):
     """Joint between two antagonistic muscles."""
 
     plant: ClassVar[Any] = AntagonisticJoint
+    loop = Loop("PAM/AntagonisticJoint-v0", "joint_mfc_mu", "deg", np.pi / 180.0)
     bound: ClassVar[type[RegulatedFamily]] = BoundJoint
     sizes: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "rest_length": ("muscle.rest_length",),

@@ -12,7 +12,7 @@ from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.families.adapted import with_bearing
 from pam_envs.diagnosis.families.antagonistic_joint import PAIRS, TITLES, difference_of
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
-from pam_envs.diagnosis.plant_protocol import Signals
+from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
@@ -69,6 +69,7 @@ class ElbowKind(RegulatedKind):
     """Elbow orthosis with two bundles of muscles and proportional valves."""
 
     plant = ElbowOrthosis
+    loop = Loop("PAM/ElbowOrthosis-v0", "elbow_allocation", "N m", 1.0)
     bound = BoundElbow
     sizes: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "rest_length": ("bundle_a.nominal_length", "bundle_b.nominal_length"),

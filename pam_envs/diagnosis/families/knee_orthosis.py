@@ -24,7 +24,7 @@ from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.single_muscle import grouped
-from pam_envs.diagnosis.plant_protocol import Signals
+from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.hysteresis import (
@@ -146,6 +146,7 @@ class KneeKind(RegulatedKind):
     """Knee orthosis without a leg, or its muscle in a rig."""
 
     plant = KneeOrthosis
+    loop = Loop("PAM/KneeTension-v0", "knee_inverse_ltr", "N", 1.0)
     bound = BoundKnee
     renamed = ({"position": "angle", "mass": "lever"}, {"position": "tension", "mass": "lever"})
     factors = FACTORS

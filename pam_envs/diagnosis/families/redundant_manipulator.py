@@ -23,7 +23,7 @@ from pam_envs.diagnosis.families.antagonistic_joint import (
     difference_of,
 )
 from pam_envs.diagnosis.fit.single_muscle import CLOCK
-from pam_envs.diagnosis.plant_protocol import Signals
+from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import JOINT_OUTPUTS, MUSCLE_OUTPUTS
 
@@ -86,6 +86,7 @@ class ArmKind(JointKind):
     """Arm of joints between antagonistic muscles."""
 
     plant = RedundantManipulator
+    loop = Loop("PAM/RedundantManipulator-v0", "joint_mfc_mu", "mm", 1e-3, "drawn")
     bound = BoundArm
     catalogue = (*(c for c in with_yielding(catalogue()) if c.name != "static_law"), UNEQUAL)
 

@@ -34,7 +34,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
     with_range,
 )
 from pam_envs.diagnosis.fit.starting_values import Grid
-from pam_envs.diagnosis.plant_protocol import Output
+from pam_envs.diagnosis.plant_protocol import Loop, Output
 from pam_envs.muscle.law_correction import NAMES as TERM_NAMES
 from pam_envs.muscle.law_correction import TERMS, LawCorrection
 from pam_envs.plants.core.rollout import drives_of
@@ -184,6 +184,8 @@ class RegulatedKind:
     renamed, factors, titles
         Of the causes (:func:`pam_envs.diagnosis.families.adapted.adapted`), for each sensor of the
         motion.
+    loop : Loop
+        Closed loop with the paper's controller.
     """
 
     plant: ClassVar[Any]
@@ -195,6 +197,8 @@ class RegulatedKind:
     catalogue: ClassVar[tuple[Cause, ...]]
     weighed: ClassVar[bool] = False
     experiments: ClassVar[bool] = False
+    loop: ClassVar[Loop]
+    loop_reason: ClassVar[str] = ""
 
     @property
     def name(self) -> str:
@@ -206,11 +210,6 @@ class RegulatedKind:
         """Outputs that a recording may hold."""
         names = [c.name for c in WIRINGS[self.name].outputs]
         return tuple(Output(name, NOISE[name.partition("_")[0]]) for name in names)
-
-    @property
-    def loop_reason(self) -> str:
-        """Reason why controllers are not compared."""
-        return f"controllers are not compared for the plant {self.name}"
 
     def preset(self) -> Any:
         """Return the default plant."""

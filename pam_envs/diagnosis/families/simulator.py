@@ -290,7 +290,7 @@ class SimulatorKind:
     """Any simulation."""
 
     weighed, experiments = False, False
-    loop_reason = "controllers of a simulation are not compared"
+    loop, loop_reason = None, "controllers of a simulation are not compared"
 
     def __init__(self, plant: Simulator) -> None:
         self.plant, self.name, self.catalogue = plant, plant.name, plant.causes

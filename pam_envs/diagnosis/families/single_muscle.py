@@ -59,7 +59,8 @@ class MuscleKind:
         for pair in zip(MuscleFamily.channels, MuscleFamily.fallback_noise, strict=True)
     )
     catalogue = catalogue()
-    weighed, experiments, loop_reason = True, True, ""
+    weighed, experiments = True, True
+    loop, loop_reason = None, ""
 
     def start(self, sheet: Rig) -> SingleMuscle:
         """Return the shipped muscle, scaled to the rig, without any effect."""

@@ -9,21 +9,20 @@ m +- t s sqrt(1 + 1/n), where t is the quantile of Student's t with n - 1 degree
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from scipy import stats
 
 from pam_envs.arrays import Array
+from pam_envs.checkout import catalogue
+from pam_envs.envs.episodes import run_episodes
 from pam_envs.envs.positioning.env import MusclePositioningEnv
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.rig.comparison.figures import FIGURES, Run, settled_parts
 from pam_envs.rig.comparison.references import Holds, check_reach
 from pam_envs.rig.comparison.table import Condition, Measurement
 
-CATALOGUE = "pam_envs.baselines.core.catalogue"
-"""Module of the controllers, loaded on use: it builds on this package."""
 ENV = "PAM/MusclePositioning-v0"
 LEVEL = 0.95
 FEWEST, MOST = 3, 1000
@@ -104,7 +103,7 @@ class Prediction:
 
 def entry_of(measured: Measurement) -> Any:
     """Return the catalogue entry of a controller; ValueError names those of the environment."""
-    known = {n: e for n, e in import_module(CATALOGUE).CONTROLLERS.items() if ENV in e.envs}
+    known = {n: e for n, e in catalogue().CONTROLLERS.items() if ENV in e.envs}
     if measured.controller not in known:
         raise ValueError(
             f"line {measured.line}: no controller of {ENV} is named {measured.controller!r}; "
@@ -191,31 +190,15 @@ def _runs(
 ) -> tuple[list[Run], int]:
     """Return the completed runs and the number of failed ones; the runs advance together."""
     envs = _envs(settings, load, references)
-    made = import_module(CATALOGUE).make_controller(
+    made = catalogue().make_controller(
         controller, settings.model, envs[0].signals, envs[0].action_signals, settings.seed
     )
-    observations = np.stack([env.reset(seed=settings.seed + k)[0] for k, env in enumerate(envs)])
-    steps, count = max(map(len, references)), len(envs)
-    record = np.full((3, steps, count), np.nan)
-    state, start, running, failed = None, np.ones(count, bool), np.ones(count, bool), 0
-    for step in range(steps):
-        actions, state = made.predict(observations, state, start, True)
-        start, observations = np.zeros(count, bool), observations.copy()
-        for k in np.flatnonzero(running):
-            observations[k], _, terminated, truncated, info = envs[k].step(actions[k])
-            record[:, step, k] = (
-                info["reference"],
-                info["sensor/contraction"],
-                info["effort/pressure_travel"],
-            )
-            failed += int(terminated)
-            running[k] = not (terminated or truncated)
-        if not running.any():
-            break
+    names = "reference", "sensor/contraction", "effort/pressure_travel"
+    record, ended = run_episodes(envs, made, lambda info: [info[n] for n in names], settings.seed)
     period = settings.plant.control_period
     whole = [
         record[:, : len(reference), k]
         for k, reference in enumerate(references)
-        if np.isfinite(record[:, len(reference) - 1, k]).all()
+        if np.isfinite(record[0, :, k]).sum() == len(reference)
     ]
-    return [Run(x[0], x[1], x[2], period, settings.settled) for x in whole], failed
+    return [Run(x[0], x[1], x[2], period, settings.settled) for x in whole], int(ended.sum())

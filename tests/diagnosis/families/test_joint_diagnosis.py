@@ -59,7 +59,11 @@ def test_hidden_effect_is_named_and_explains_the_error(name):
     explained = found.report["explained"]
     worst = max(explained, key=lambda c: explained[c]["before"] / explained[c]["floor"])
     assert explained[worst]["share"] > 0.9
-    assert found.report["closed_loop"] is None
+    loop, reason = found.report["closed_loop"], found.report["closed_loop_reason"]
+    if name == "stick_slip":
+        assert (loop, reason) == (None, "a controller cannot compensate stick_slip")
+    else:
+        assert (loop["controller"], loop["unit"], reason) == ("joint_mfc_mu", "deg", None)
 
 
 @needs_kernels

@@ -30,6 +30,8 @@ ENVIRONMENTS = {
     "KNEE": "PAM/KneeStiffness-v0",
 }
 """Environments of the rigs; those of the arm need five joints, and the rig has two."""
+UNITS = {"ELBOW": "N m", "KNEE": "N"}
+"""Units of the tracking errors of the families' controllers."""
 
 
 @needs_kernels
@@ -41,7 +43,7 @@ def test_hidden_effect_is_named_and_its_plant_goes_into_an_environment(family, t
     explained = found.report["explained"]
     worst = max(explained, key=lambda c: explained[c]["before"] / explained[c]["floor"])
     assert explained[worst]["share"] > 0.8
-    assert "controllers" in found.report["closed_loop_reason"]
+    assert_controllers_are_compared(found, family)
     found.write(tmp_path)
     assert "<svg" in (tmp_path / "report.html").read_text()
     report = json.loads((tmp_path / "report.json").read_text())
@@ -51,6 +53,19 @@ def test_hidden_effect_is_named_and_its_plant_goes_into_an_environment(family, t
         env = gym.make(ENVIRONMENTS[family], plant=str(path))
         assert env.unwrapped.plant.digest() == digest
         env.close()
+
+
+def assert_controllers_are_compared(found, family):
+    """Assert that the paper's controller was compared, unless the environment takes no such arm."""
+    loop, reason = found.report["closed_loop"], found.report["closed_loop_reason"]
+    if family not in ENVIRONMENTS:
+        assert loop is None
+        assert "a chain of 2 joints" in reason
+        return
+    assert reason is None
+    assert loop["unit"] == UNITS[family]
+    assert loop["better_percent"]["interval"][0] > 0.0
+    assert f"{loop['after']['value']:.3g} instead of" in found.text
 
 
 @needs_kernels
