@@ -29,7 +29,7 @@ Design = Callable[[Any, Any, Any], Any]
 
 def environments(loop: Loop, plant: Any) -> list[Any]:
     """Return an environment for each episode; ValueError if it takes no such plant."""
-    given = {} if loop.reference is None else {"reference": loop.reference}
+    given: dict[str, Any] = {} if loop.reference is None else {"reference": loop.reference}
     return [
         gym.make(loop.env, plant=plant, disable_env_checker=True, **given).unwrapped
         for _ in range(EPISODES)
