@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import stdtr
 
-from pam_envs.arrays import Indices
+from pam_envs.arrays import Flags, Indices
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, refit
@@ -65,16 +65,29 @@ def imitates(model: Candidate, other: Candidate) -> bool:
 def cross_validate(
     problem: Problem, blocks: Blocks, candidates: Sequence[Candidate], rule: Rule
 ) -> list[Candidate]:
-    """Return candidates with errors on every block, each from a fit that left the block out."""
+    """Return candidates with errors on every block, each from a fit that left the block out.
+
+    A block that alone shows a shape, like that of a start, is in every fit.
+    """
     errors = [candidate.errors.copy() for candidate in candidates]
     fold = (np.arange(len(blocks.held_out)) - np.flatnonzero(blocks.held_out)[0]) % rule.folds
+    alone = showing_alone(problem, blocks)
     for k in range(1, rule.folds):
-        out = fold == k
+        out = (fold == k) & ~alone
         part = replace(blocks, held_out=out)
         again = replace(problem, train=part.train)
         for candidate, kept in zip(candidates, errors, strict=True):
             kept[:, out] = refit(again, part, candidate, CROSS_ROUNDS, problem).errors[:, out]
     return [replace(c, errors=e) for c, e in zip(candidates, errors, strict=True)]
+
+
+def showing_alone(problem: Problem, blocks: Blocks) -> Flags:
+    """Return the blocks with more than half of the square of a shape, (n,)."""
+    found = np.zeros(len(blocks.held_out), bool)
+    for shape in problem.shapes:
+        sizes = np.bincount(blocks.of, shape**2, minlength=len(found))
+        found |= sizes > 0.5 * sizes.sum()
+    return found
 
 
 def p_value(

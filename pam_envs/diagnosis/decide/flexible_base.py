@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from pam_envs.arrays import Array
+from pam_envs.arrays import Array, Flags
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.cause import Cause, Form
@@ -48,6 +48,8 @@ SPARSE_ROUNDS, SPARSE_LOSS = 4, 0.02
 """Rounds of a fit without the others, and the gain that it may lose."""
 STARTS = 2
 """Number of starting values of each difference."""
+NOTHING = 1e-3
+"""Mean square over the noise below which a difference changes nothing: a gain of about 0.001."""
 
 
 def shapes_of(recording: Recording, sheet: Rig) -> Array:
@@ -178,7 +180,12 @@ class FlexibleBase:
         while any(cause.common for cause, _ in model.causes):
             expected = self.expected(model)
             limit, clear = (OBVIOUS, CLEAR) if self.linear else (np.inf, np.inf)
-            doubtful = {n for n, gain in expected.items() if gain <= limit and n not in needed}
+            named = {c.name: self.least_gain_of(c, model) for c, _ in model.causes}
+            doubtful = {
+                n
+                for n, gain in expected.items()
+                if gain <= max(limit, named[n]) and n not in needed
+            }
             smaller = without_each_cause(*data, model, doubtful, clear)
             losses = {name: self.loss(less, model) for name, less in smaller.items()}
             needed |= {name for name, loss in losses.items() if loss > CLEAR}
@@ -237,7 +244,7 @@ class FlexibleBase:
         chosen = self.chosen([c for c in causes if c.common])
         if not chosen or self.fits():
             return self.base
-        model = self.sparse(self.needed(self.fitted(chosen)))
+        model = self.sparse(self.needed(self.acting(self.fitted(chosen))))
         if len(model.fit.frees) > len(self.base.fit.frees):
             model = refit(self.problem, self.blocks, model, 2)
         complete_jacobian(self.problem, model.fit)
@@ -273,6 +280,15 @@ class FlexibleBase:
         shown = {f.name for f, k in zip(fit.frees, kept, strict=True) if k}
         idle = set(_idle(model.causes, shown))
         kept &= np.array([f.name not in idle for f in fit.frees])
+        smaller = self.reduced(model, kept, z, SPARSE_ROUNDS)
+        return smaller if self.blocks.gain(smaller.errors, model.errors) < SPARSE_LOSS else model
+
+    def reduced(self, model: Candidate, kept: Flags, z: Array, rounds: int) -> Candidate:
+        """Return a model fitted without some of its parameters, which take the plain values.
+
+        ``kept`` are the others, and ``z`` the coordinates at which the fit starts, both (k,).
+        """
+        fit, neutral = model.fit, self.family.column
         column = fit.column.copy()
         for gone in np.flatnonzero(~kept):
             column[fit.frees[gone].place] = neutral[fit.frees[gone].place]
@@ -281,10 +297,29 @@ class FlexibleBase:
         less = restarted(fit, frees=frees, z=inside, column=column, shared=None)
         less.take(fit.slopes[kept])
         lsq.evaluate(self.problem, [less])
-        lsq.improve(self.problem, [less], SPARSE_ROUNDS, 1e-4)
+        lsq.improve(self.problem, [less], rounds, 1e-4)
         errors = self.blocks.errors(self.problem.rows(less.residual))
-        smaller = Candidate(tuple(_shown(model.causes, {f.name for f in frees})), less, errors)
-        return smaller if self.blocks.gain(smaller.errors, model.errors) < SPARSE_LOSS else model
+        return Candidate(tuple(_shown(model.causes, {f.name for f in frees})), less, errors)
+
+    def acting(self, model: Candidate) -> Candidate:
+        """Return a model without the common differences that change nothing at their values."""
+        fit, neutral = model.fit, self.family.column
+        here = lsq.column_of(fit, fit.z)
+        common = [form for cause, form in model.causes if cause.common]
+        columns = np.repeat(here[None], len(common), axis=0)
+        for column, form in zip(columns, common, strict=True):
+            for term in form.terms:
+                place = self.family.free(term.name, log=False).place
+                column[place] = neutral[place]
+        moved = self.problem.residuals(columns) - self.problem.residuals(here[None])
+        gone = {
+            term.name
+            for form, change in zip(common, moved, strict=True)
+            if np.mean(change**2) < NOTHING
+            for term in form.terms
+        }
+        kept = np.array([f.name not in gone for f in fit.frees])
+        return model if kept.all() else self.reduced(model, kept, fit.z, 0)
 
     def fits(self) -> bool:
         """Return whether the base leaves hardly more than noise on every channel."""

@@ -14,7 +14,7 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "9"  # part of every report
+    version: str = "10"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     # the same on a rig whose law or friction differs from the base: a smaller gain may correct what
@@ -165,8 +165,12 @@ def required_gain(first: float, possible: float, rule: Rule) -> float:
 
 
 def is_accepted(level: Mapping[str, Any], required: float, rule: Rule) -> bool:
-    """Return whether a further cause has the required gain, and a significant one."""
-    return bool(level["added"] >= required and level["unsure"] <= rule.doubt)
+    """Return whether a further cause has the required gain, and a significant one.
+
+    No cause gains more than a model that leaves only noise: where it does, a fit has failed.
+    """
+    gained = min(level["added"], level["possible"])
+    return bool(gained >= required and level["unsure"] <= rule.doubt)
 
 
 def explained_fraction(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:

@@ -161,7 +161,10 @@ def _traces(problem: lsq.Problem, here: Array, columns: Sequence[Array]) -> Arra
 
 @dataclass(frozen=True)
 class _Projection:
-    """Linear model of a fit: what a refit of its parameters absorbs."""
+    """Linear model of a fit: what a refit of its parameters absorbs.
+
+    A parameter at a bound beyond which the cost decreases further stays there.
+    """
 
     residual: Array
     shared: lsq.Shared
@@ -172,10 +175,12 @@ class _Projection:
     def of(cls, problem: lsq.Problem, base: lsq.Fit, shared: lsq.Shared) -> "_Projection":
         """Return the projection at the coordinates of a fit."""
         residual, table = base.residual[: problem.seen], base.table
-        normal = shared.gram + np.diag(table.precision)
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-12))
-        inverse = np.linalg.pinv(normal * np.outer(scale, scale), rcond=RIDGE, hermitian=True)
         gradient = shared.slopes @ residual + (base.z - table.start) * table.precision
+        low, high = table.spans
+        held = ((base.z <= low) & (gradient > 0.0)) | ((base.z >= high) & (gradient < 0.0))
+        normal = shared.gram + np.diag(table.precision)
+        scale = np.where(held, 0.0, 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-12)))
+        inverse = np.linalg.pinv(normal * np.outer(scale, scale), rcond=RIDGE, hermitian=True)
         return cls(residual, shared, inverse * np.outer(scale, scale), gradient)
 
     def left(self, traces: Array) -> Callable[[slice], tuple[Array, Array]]:

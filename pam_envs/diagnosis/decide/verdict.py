@@ -273,7 +273,11 @@ class Ladder:
     ) -> None:
         """Compare open rivals on all blocks; update the level and its evidence in place."""
         level, found = levels[judged.level], evidence["levels"][judged.level]
-        places = [0, *judged.open_rivals]
+        first, *others = found["rivals"]
+        ahead = [  # of which the first is a limit
+            k for k, r in enumerate(others, 1) if r["imitates"] and r["gain"] > first["gain"]
+        ]
+        places = [0, *judged.open_rivals, *ahead]
         smaller = levels[judged.level - 1].model
         compared = [levels[0].model, smaller, *(level.rivals[k] for k in places)]
         base, before, *again = cross_validate(self.problem, self.blocks, compared, self.rule)
