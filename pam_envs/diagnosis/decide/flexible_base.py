@@ -257,7 +257,7 @@ class FlexibleBase:
         the other by a linear model of the residual.
         """
         complete_jacobian(self.problem, model.fit)
-        fit, plain, neutral = model.fit, self.plain(model.fit), self.family.column
+        fit, plain = model.fit, self.plain(model.fit)
         normal, _ = lsq.normal_equations(self.problem, fit)
         known = {f.name for f in self.base.fit.frees}
         free = [k for k, f in enumerate(fit.frees) if f.name not in known and np.isfinite(plain[k])]
