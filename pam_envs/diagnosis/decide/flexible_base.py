@@ -318,8 +318,11 @@ class FlexibleBase:
             if np.mean(change**2) < NOTHING
             for term in form.terms
         }
+        if not gone:
+            return model
+        complete_jacobian(self.problem, fit)
         kept = np.array([f.name not in gone for f in fit.frees])
-        return model if kept.all() else self.reduced(model, kept, fit.z, 0)
+        return self.reduced(model, kept, fit.z, 0)
 
     def fits(self) -> bool:
         """Return whether the base leaves hardly more than noise on every channel."""

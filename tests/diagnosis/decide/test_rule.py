@@ -70,6 +70,8 @@ BOTH = rival("leak", "creep", gain=1.3, better=1.0)
         (evidence(level(3.0, LEAK), level(3.4, BOTH, added=0.4, possible=0.5)), "named", 2),
         (evidence(level(3.0, LEAK), level(3.7, BOTH, added=0.7)), "named", 2),
         (evidence(level(3.0, LEAK), level(3.08, BOTH, added=0.08, possible=0.1)), "named", 1),
+        (evidence(level(2.2, LEAK, possible=0.05)), "adequate", 0),
+        (evidence(level(2.2, LEAK, possible=0.5)), "named", 1),
     ],
 )
 def test_verdict_follows_from_evidence(found, verdict, names):
