@@ -24,9 +24,9 @@ SWITCH = "regulator.flow"
 REPLACED = (
     *("slew_bend", "slew_ratio", "overlap", "exhaust_ratio", "exhaust_rate", "pilot_lag"),
     *("pilot_damping", "overlap_leak", "exhaust_taper", "dead_close", "supply_time"),
-    *("time_constant", "slew_rate"),
+    *("time_constant", "slew_rate", "supply_effect"),
 )
-"""Parameters of a regulator that the orifices replace; the first six are effects that are off."""
+"""Parameters of a regulator that the orifices replace; the first six and the last are off."""
 
 
 @dataclass(frozen=True, kw_only=True)

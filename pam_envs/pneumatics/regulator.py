@@ -23,12 +23,19 @@ AMPLE = 2e7
 
 @dataclass(frozen=True, kw_only=True)
 class SupplyEffects:
-    """Supply of a regulator, without limit by default."""
+    """Supply of a regulator, without limit by default.
+
+    A drop of the supply lowers every setpoint by ``supply_effect`` (the pressure regulation
+    characteristic of a regulator, ISO 6953).
+    """
 
     supply_pressure: float = assumed(AMPLE, "Pa", 5e4, AMPLE, "reservoir at rest", neutral=AMPLE)
     supply_droop: float = effect("1", 0.0, 5.0, "supply pressure lost over pressure filled")
     supply_time: float = assumed(0.01, "s", 0.001, 5.0, "filling time at full flow")
     supply_recovery: float = assumed(10.0, "s", 0.1, 1e3, "filling time of the empty reservoir")
+    supply_effect: float = effect(
+        "1", 0.0, 5.0, "share of the setpoint lost over drop of the supply per full pressure"
+    )
 
 
 @kernel
@@ -146,6 +153,7 @@ class RegulatorEffects(FlowEffects, LineEffects, SupplyEffects, ValveEffects):
         ("leak",),
         ("pilot_lag", "pilot_damping"),
         ("supply_pressure", "supply_droop", "supply_time", "supply_recovery"),
+        ("supply_effect",),
         ("ring_share", "ring_flow", "ring_frequency", "ring_damping"),
         *FlowEffects.effects,
     )
@@ -398,7 +406,8 @@ def regulate_with_effects(
     pressure = rows[state + AIR_STATE.regulated][j]
     drop = rows[state + AIR_STATE.drop][j]
     target = pilot_step(rows, fixed, j, state, effects, target, pressure, h)
-    goal = fixed[effects + AIR.gain][j] * target
+    lost = min(1.0, fixed[effects + AIR.supply_effect][j] * drop / full)
+    goal = fixed[effects + AIR.gain][j] * target * (1.0 - lost)
     wide = fixed[effects + AIR.dead_band][j]
     band = wide * fixed[effects + AIR.dead_close][j]
     off, before = abs(goal - pressure), rows[state + AIR_STATE.opened][j]
@@ -493,6 +502,7 @@ def valve_effects_on(fixed: Any, effects: int) -> int:
         + count_on(fixed[effects + AIR.slew_ratio], 1.0)
         + count_on(fixed[effects + AIR.pilot_lag], 0.0)
         + count_on(fixed[effects + AIR.exhaust_taper], 0.0)
+        + count_on(fixed[effects + AIR.supply_effect], 0.0)
     )
     daily = (
         count_on(fixed[effects + AIR.exhaust_ratio], 1.0)

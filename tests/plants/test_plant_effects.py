@@ -123,6 +123,22 @@ def test_supply_limits_and_droops(name: str) -> None:
 
 
 @EVERY
+def test_drop_of_the_supply_lowers_every_setpoint_until_it_has_recovered(name: str) -> None:
+    used = {"regulator.supply_droop": 0.1, "regulator.supply_recovery": 30.0}
+    command = np.concatenate([np.full(20, 1e5), np.full(100, 3e5), np.full(100, 1e5)])
+    plain, idle, lowered = (
+        driven(name, c, command)["pressure"]
+        for c in ({}, used, {**used, "regulator.supply_effect": 0.5})
+    )
+    assert np.array_equal(idle, plain)
+    lost = 1.0 - lowered / plain
+    # 20 kPa of drop over 600 kPa of full pressure, halved, once the rise is over
+    assert 0.5 * 20.0 / 600.0 * 0.4 < lost[60] < 0.5 * 20.0 / 600.0 * 1.05
+    assert np.all(np.diff(lost[60:115]) < 0.0)
+    assert lost[-1] < 0.1 * lost[60]
+
+
+@EVERY
 def test_line_rings_at_its_frequency(name: str) -> None:
     ringing = {
         "regulator.ring_share": 1.0,

@@ -3,7 +3,8 @@
 The pressure of a small reservoir or a long feed falls as air is used and recovers slowly. High
 commands are then missed or reached late, increasingly so after heavy use; below the supply pressure
 there is no effect. In the plant filling passes a throat from a supply that falls with the filled
-amount and recovers through an orifice.
+amount and recovers through an orifice. A regulator whose output depends on its supply lowers every
+setpoint instead, in proportion to the drop.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
@@ -11,6 +12,9 @@ from pam_envs.diagnosis.fit.starting_values import grid
 
 _SUPPLIES, _DROOPS = (5.6e5, 6.1e5, 6.4e5, 6.8e5, 7.2e5), (0.1, 0.4)
 _TIMES, _RECOVERIES = (0.02, 0.06, 0.2), (2.0, 6.0)
+_EFFECTS, _LOSSES, _RETURNS = (0.1,), (0.03, 0.3), (30.0, 100.0, 300.0)
+"""Effect of the drop on a setpoint; the drop is small beside a supply without a limit, so that it
+recovers in a fraction of the time in which the empty reservoir would be filled."""
 
 CAUSE = Cause(
     name="supply_droop",
@@ -26,8 +30,20 @@ CAUSE = Cause(
             ),
             search=grid(_SUPPLIES, _DROOPS, _TIMES, _RECOVERIES),
         ),
+        Form(
+            "regulator",
+            (
+                Term("regulator.supply_effect", (0.1,), scale=0.05),
+                Term("regulator.supply_droop", (0.1,), scale=0.05, amount=False),
+                Term("regulator.supply_recovery", (100.0,), log=True, amount=False),
+            ),
+            search=grid(_EFFECTS, _LOSSES, _RETURNS),
+        ),
     ),
-    signature="peaks of the pressure are clipped or late, more so after heavy use; deflation fits",
+    signature=(
+        "peaks of the pressure are clipped or late, or high pressures too low, more so after heavy "
+        "use; deflation fits"
+    ),
     neighbours=("slew_limit", "exhaust_asymmetry"),
     experiment=(
         "Fill to the top again and again, then once after a rest: a droop grows with the number of "
