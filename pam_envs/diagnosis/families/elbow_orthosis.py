@@ -9,11 +9,18 @@ import numpy as np
 from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.families.adapted import with_bearing
-from pam_envs.diagnosis.families.antagonistic_joint import PAIRS, TITLES, difference_of
+from pam_envs.diagnosis.families.adapted import TAIL, with_bearing, with_yielding
+from pam_envs.diagnosis.families.antagonistic_joint import (
+    LEAST_BREAK,
+    PAIRS,
+    TITLES,
+    difference_of,
+)
+from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
 from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.elbow_orthosis import rows as K
+from pam_envs.plants.elbow_orthosis.hysteresis import REFERENCE_PRESSURE
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 BUNDLE: dict[str, dict[str, Any]] = {
@@ -59,6 +66,27 @@ class BoundElbow(RegulatedFamily):
             thresholds = np.array(self.plant.hysteresis.operator.thresholds)
             columns[:, K.LARGEST_LAG] = columns[:, first : first + n] @ thresholds
 
+    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
+        """Return starting values at which all friction yields smoothly."""
+        thresholds = getattr(self.plant.hysteresis.operator, "thresholds", ())
+        weights = np.array([found.get(f"{WEIGHT}{k}]", 0.0) for k in range(len(thresholds))])
+        if not weights.sum() > 0.0:
+            return dict(found)
+        way = float(weights @ np.array(thresholds) / weights.sum())  # mean break [m]
+        ends = {f"bundle_{s}.{name}": found[f"bundle_{s}.{name}"] for s in "ab" for name in BUNDLE}
+        bundle = self.plant.replace(ends).bundle_b
+        still, pressed = bundle.passive_factor, bundle.pressure_factor
+        size = 0.5 * found["hysteresis.loop"] * float(bundle.shape(0.0)) / bundle.muscles
+        away = way * still / (still + pressed * REFERENCE_PRESSURE) / bundle.nominal_length
+        return {
+            **found,
+            "hysteresis.loop": self.free("hysteresis.loop").low,
+            "hysteresis.yield_force": size * still,
+            "hysteresis.yield_per_pressure": size * pressed,
+            "hysteresis.yield_break": max(away, LEAST_BREAK),
+            "hysteresis.yield_ratio": 0.5,
+        }
+
     def signals(self, recording: Recording, outputs: Array) -> Signals:
         """Return the angle and the difference of the pressures, positive in flexion."""
         first, second = self.setpoints(recording)
@@ -78,7 +106,7 @@ class ElbowKind(RegulatedKind):
     renamed = ({"position": "angle", "mass": "link"},)
     factors = FACTORS
     titles = TITLES
-    catalogue = with_bearing("link", BREAKS)
+    catalogue = with_yielding(with_bearing("link", BREAKS), (TAIL,), "hysteresis")
 
     def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundElbow:
         """Return an orthosis with the inputs of a recording; ValueError with on/off valves."""
