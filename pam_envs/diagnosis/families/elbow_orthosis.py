@@ -67,7 +67,11 @@ class BoundElbow(RegulatedFamily):
             columns[:, K.LARGEST_LAG] = columns[:, first : first + n] @ thresholds
 
     def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
-        """Return starting values at which all friction yields smoothly."""
+        """Return starting values at which all friction yields smoothly.
+
+        At half of the full pressure it is that of the base, and there half of it is without
+        pressure.
+        """
         thresholds = getattr(self.plant.hysteresis.operator, "thresholds", ())
         weights = np.array([found.get(f"{WEIGHT}{k}]", 0.0) for k in range(len(thresholds))])
         if not weights.sum() > 0.0:
@@ -75,14 +79,15 @@ class BoundElbow(RegulatedFamily):
         way = float(weights @ np.array(thresholds) / weights.sum())  # mean break [m]
         ends = {f"bundle_{s}.{name}": found[f"bundle_{s}.{name}"] for s in "ab" for name in BUNDLE}
         bundle = self.plant.replace(ends).bundle_b
-        still, pressed = bundle.passive_factor, bundle.pressure_factor
-        size = 0.5 * found["hysteresis.loop"] * float(bundle.shape(0.0)) / bundle.muscles
-        away = way * still / (still + pressed * REFERENCE_PRESSURE) / bundle.nominal_length
+        usual = 0.5 * self.plant.full_pressure
+        now, there = (float(bundle.factor(p)) for p in (usual, REFERENCE_PRESSURE))
+        force = 0.5 * found["hysteresis.loop"] * float(bundle.shape(0.0)) * now / bundle.muscles
+        away = 0.5 * way * now / there / bundle.nominal_length
         return {
             **found,
             "hysteresis.loop": self.free("hysteresis.loop").low,
-            "hysteresis.yield_force": size * still,
-            "hysteresis.yield_per_pressure": size * pressed,
+            "hysteresis.yield_force": 0.5 * force,
+            "hysteresis.yield_per_pressure": 0.5 * force / usual,
             "hysteresis.yield_break": max(away, LEAST_BREAK),
             "hysteresis.yield_ratio": 0.5,
         }
