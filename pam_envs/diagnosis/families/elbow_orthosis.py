@@ -1,4 +1,8 @@
-"""Elbow orthosis as a diagnosable plant: angle, both pressures, torque and forces."""
+"""Elbow orthosis as a diagnosable plant: angle, both pressures, torque and forces.
+
+The pressure may change how far the friction of the bundles reaches, or how stiff it is (see
+:mod:`pam_envs.plants.elbow_orthosis.hysteresis`): the base has the one that fits better.
+"""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -20,7 +24,7 @@ from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
 from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.elbow_orthosis import rows as K
-from pam_envs.plants.elbow_orthosis.hysteresis import REFERENCE_PRESSURE
+from pam_envs.plants.elbow_orthosis.hysteresis import REFERENCE_PRESSURE, elbow_hysteresis
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 BUNDLE: dict[str, dict[str, Any]] = {
@@ -48,6 +52,7 @@ FACTORS = {
 """Usual sizes of the elbow over those of a muscle, by their units: a pulley of 31.5 mm."""
 BREAKS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 """Breakaway torques [N m] at which the search for a sticking bearing begins."""
+BY_LENGTH, BY_PRESSURE = "maxwell_slip_length", "maxwell_slip"
 
 
 class BoundElbow(RegulatedFamily):
@@ -81,8 +86,9 @@ class BoundElbow(RegulatedFamily):
         bundle = self.plant.replace(ends).bundle_b
         usual = 0.5 * self.plant.full_pressure
         now, there = (float(bundle.factor(p)) for p in (usual, REFERENCE_PRESSURE))
+        nearer = 0.5 * now / there if self.plant.hysteresis.drive == "length" else 1.0
         force = 0.5 * found["hysteresis.loop"] * float(bundle.shape(0.0)) * now / bundle.muscles
-        away = 0.5 * way * now / there / bundle.nominal_length
+        away = nearer * way / bundle.nominal_length
         return {
             **found,
             "hysteresis.loop": self.free("hysteresis.loop").low,
@@ -123,6 +129,13 @@ class ElbowKind(RegulatedKind):
             )
         bound: BoundElbow = super().bind(plant, recording, sheet)
         return bound
+
+    def rival(self, plant: Any) -> Any:
+        """Return the orthosis whose pressure changes the stiffness of the friction."""
+        if plant.hysteresis.kind != BY_LENGTH:
+            return None
+        operator = elbow_hysteresis(BY_PRESSURE).operator
+        return plant.replace({"hysteresis.operator": operator})
 
     def commanded(self, plant: Any) -> tuple[str, ...]:
         """Return the inputs of the loop that are setpoints."""

@@ -59,8 +59,10 @@ class ElbowHysteresis(DriveEffects, LengthYieldTailEffects, OperatorComponent):
     """Thread-on-thread friction of both bundles.
 
     ``operator`` turns travel [m] into the travel that the friction follows, with slope 1 and a
-    virgin start. Yielding friction acts beside it and is that of one muscle of a bundle, whose strain
-    is over the nominal length of the bundle.
+    virgin start. Yielding friction acts beside it and is that of one muscle of a bundle, whose
+    strain is over the nominal length of the bundle. With an operator that is driven by the
+    pressure, this changes the stiffness of the yielding friction; with one driven by length the
+    strain at which it slips, so that it is passive.
     """
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (

@@ -52,7 +52,7 @@ globals().update(
             yields="hysteresis",
         )
         | {"tail": ("hysteresis.yield_tail",)},
-        each("effective crept deflection yielded rub stick", 2)
+        each("effective crept deflection yielded stick", 2)
         | {"paths": 2 * PATH_STATE.end, "stuck": 1, "sensors": sensor_rows(3)},
         {"model": NUMBERS, "largest_lag": 1},
         operators=2,

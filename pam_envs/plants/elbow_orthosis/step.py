@@ -16,6 +16,7 @@ from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.guide import turn
 from pam_envs.mechanics.pulley import stop_torque
+from pam_envs.muscle.effects import yield_spring
 from pam_envs.plants.core.muscle_path import DELAYED, begin_delay
 from pam_envs.plants.core.sensors import begin_sensors, read_sensors
 from pam_envs.plants.elbow_orthosis import rows as K
@@ -34,7 +35,7 @@ from pam_envs.plants.elbow_orthosis.bundles import (
     travel_at,
     weight_of,
 )
-from pam_envs.plants.elbow_orthosis.effects import bundle_kernels
+from pam_envs.plants.elbow_orthosis.effects import bundle_kernels, spring_at_pressure
 from pam_envs.plants.elbow_orthosis.hysteresis import REFERENCE_PRESSURE
 
 SOFTEST = 0.1
@@ -74,8 +75,8 @@ def move_yield(rows: Any, fixed: Any, first: int, last: int) -> None:
 
 
 @kernel
-def rub_of(rows: Any, j: int, side: int) -> float:
-    """Return the yielding friction [N] against the contraction of a bundle."""
+def rub_of(rows: Any, fixed: Any, j: int, side: int, pressure: float) -> float:
+    """Return the yielding friction [N] against the contraction of a bundle at a pressure [Pa]."""
     return 0.0
 
 
@@ -190,9 +191,11 @@ def middle_torque(rows: Any, fixed: Any, j: int, work: Any) -> tuple[float, floa
     old, slope = passive_torque(fixed, j, angle)
     new = old
     for side in range(2):
-        sign, lag, rub = 2.0 * side - 1.0, lag_of(rows, j, side), rub_of(rows, j, side)
-        was, soft, _ = pulled(fixed, j, side, angle, lag, rub, work[WAS_A + side][j])
-        now, hard, swell = pulled(fixed, j, side, angle, lag, rub, work[NOW_A + side][j])
+        sign, lag = 2.0 * side - 1.0, lag_of(rows, j, side)
+        before, after = work[WAS_A + side][j], work[NOW_A + side][j]
+        rub, rubs = rub_of(rows, fixed, j, side, before), rub_of(rows, fixed, j, side, after)
+        was, soft, _ = pulled(fixed, j, side, angle, lag, rub, before)
+        now, hard, swell = pulled(fixed, j, side, angle, lag, rubs, after)
         old, new = old + sign * radius * was, new + sign * radius * now
         growth = 0.5 * (soft + hard) - swell * work[GIVES_A + side][j] - stick_of(rows, j, side)
         slope = slope - radius * radius * growth
@@ -257,7 +260,7 @@ def report(rows: Any, fixed: Any, j: int) -> None:
     torque, stiffness, slack = 0.0, 0.0, 0.0
     for side in range(2):
         effective = rows[EFFECTIVE + side][j]
-        lag, rub = lag_of(rows, j, side), rub_of(rows, j, side)
+        lag, rub = lag_of(rows, j, side), rub_of(rows, fixed, j, side, effective)
         force, growth, _ = pulled(fixed, j, side, angle, lag, rub, effective)
         rows[K.CONTRACTION_A + side][j] = contraction_at(fixed, j, side, angle)
         rows[K.FORCE_A + side][j] = force
@@ -307,7 +310,7 @@ def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
     torque, _ = passive_torque(fixed, j, angle)
     for side in range(2):
         effective = rows[EFFECTIVE + side][j]
-        lag, rub = lag_of(rows, j, side), rub_of(rows, j, side)
+        lag, rub = lag_of(rows, j, side), rub_of(rows, fixed, j, side, effective)
         force, _, _ = pulled(fixed, j, side, angle, lag, rub, effective)
         torque = torque + (2.0 * side - 1.0) * fixed[K.PULLEY_RADIUS][j] * force
     return torque + rows[K.DRIVE][j] + rows[K.DISTURBANCE][j] - fixed[K.WEARER_STIFFNESS][j] * angle
@@ -381,7 +384,9 @@ def replacements(kind: str, valves: str, effects: int | None = None) -> dict[str
     kernels = protocol.kernels(kind) | {"start_air": STARTS[valves], "OPERATORS": operators(kind)}
     if operators(kind) == 2:
         kernels |= {"pulled": pulled_by_length, "set_limits": write_limits}
+        kernels |= {"spring_of": yield_spring}
     else:
         kernels |= {"pulled": pulled_at_pressure, "set_limits": leave_limits}
+        kernels |= {"spring_of": spring_at_pressure}
     extended = {} if effects is None else bundle_kernels(valves, effects)
     return kernels | AIR[valves] | extended
