@@ -4,6 +4,7 @@ The pressure may change how far the friction of the bundles reaches, or how stif
 :mod:`pam_envs.plants.elbow_orthosis.hysteresis`): the base has the one that fits better.
 """
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, ClassVar
@@ -22,6 +23,7 @@ from pam_envs.diagnosis.families.antagonistic_joint import (
 )
 from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
+from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.hysteresis import REFERENCE_PRESSURE, elbow_hysteresis
@@ -52,6 +54,9 @@ FACTORS = {
 """Usual sizes of the elbow over those of a muscle, by their units: a pulley of 31.5 mm."""
 BREAKS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 """Breakaway torques [N m] at which the search for a sticking bearing begins."""
+FURTHER = 1.001
+"""Least contraction at which a bundle's force ends, over the stroke: just beyond it, as the plant
+demands."""
 BY_LENGTH, BY_PRESSURE = "maxwell_slip_length", "maxwell_slip"
 
 
@@ -71,6 +76,28 @@ class BoundElbow(RegulatedFamily):
             thresholds = np.array(self.plant.hysteresis.operator.thresholds)
             columns[:, K.LARGEST_LAG] = columns[:, first : first + n] @ thresholds
 
+    def free(self, name: str, **changes: Any) -> Free:
+        """Return the fit settings of a parameter; bundles do not end before the stroke does."""
+        component, _, entry = name.partition(".")
+        if entry == "largest_contraction":
+            length = getattr(self.plant, component).nominal_length
+            changes = {"low": FURTHER * self.plant.pulley.stroke / length, **changes}
+        return super().free(name, **changes)
+
+    def plant_of(self, column: Array) -> Any:
+        """Return the plant with the parameters of a column.
+
+        The friction depends on the ratios of the weights; their sum is that of the operator, which
+        must have a slope of 1 where the pressure drives it.
+        """
+        n, first = self.elements, self._weights
+        weights = column[first : first + n]
+        if self.plant.hysteresis.drive == "pressure" and weights.sum() > 0.0:
+            whole = sum(self.plant.hysteresis.operator.weights)
+            column = column.copy()
+            column[first : first + n] = weights * (whole / weights.sum())
+        return super().plant_of(column)
+
     def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
         """Return starting values at which all friction yields smoothly.
 
@@ -82,8 +109,8 @@ class BoundElbow(RegulatedFamily):
         if not weights.sum() > 0.0:
             return dict(found)
         way = float(weights @ np.array(thresholds) / weights.sum())  # mean break [m]
-        ends = {f"bundle_{s}.{name}": found[f"bundle_{s}.{name}"] for s in "ab" for name in BUNDLE}
-        bundle = self.plant.replace(ends).bundle_b
+        law = {name: found[f"bundle_b.{name}"] for name in BUNDLE}
+        bundle = dataclasses.replace(self.plant.bundle_b, **law)
         usual = 0.5 * self.plant.full_pressure
         now, there = (float(bundle.factor(p)) for p in (usual, REFERENCE_PRESSURE))
         nearer = 0.5 * now / there if self.plant.hysteresis.drive == "length" else 1.0
