@@ -152,6 +152,15 @@ class LengthYieldEffects:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class LengthYieldTailEffects(LengthYieldEffects):
+    """The same with a tail: how the friction approaches its largest value."""
+
+    yield_tail: float = effect(
+        "1", -1.0, 1.0, "approach of the yielding friction to its limit: -1 abrupt, 1 slow"
+    )
+
+
 @kernel
 def yield_spring(fixed: Any, j: int, first: int, drive: float) -> tuple[float, float]:
     """Return the stiffness by strain [N], and the largest deflection at an effective pressure.

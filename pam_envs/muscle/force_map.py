@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
-from pam_envs.muscle.effects import LengthYieldEffects, TemperatureEffects
+from pam_envs.muscle.effects import LengthYieldTailEffects, TemperatureEffects
 from pam_envs.muscle.law_correction import FIELDS, LawCorrection
 from pam_envs.parameters import assumed, declarations, derived, effect, identified, published
 
@@ -37,7 +37,7 @@ PAPER_CONTRACTION = 0.25
 
 
 @dataclass(frozen=True)
-class ForceMap(LawCorrection, LengthYieldEffects, TemperatureEffects):
+class ForceMap(LawCorrection, LengthYieldTailEffects, TemperatureEffects):
     """Muscle DMSP-10-150N.
 
     ``stretch`` lengthens the axis of contraction. Inverses of the law do not use ``gain`` and
@@ -49,7 +49,7 @@ class ForceMap(LawCorrection, LengthYieldEffects, TemperatureEffects):
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
         *TemperatureEffects.effects,
-        (*declarations(LengthYieldEffects), "yield_tail"),
+        tuple(declarations(LengthYieldTailEffects)),
         FIELDS,
         ("friction_imbalance",),
     )
@@ -83,9 +83,6 @@ class ForceMap(LawCorrection, LengthYieldEffects, TemperatureEffects):
     )
     friction_imbalance: float = effect(
         "1", -0.9, 0.9, "share by which A has more friction and B less"
-    )
-    yield_tail: float = effect(
-        "1", -1.0, 1.0, "approach of the yielding friction to its limit: -1 abrupt, 1 slow"
     )
     viscosity: float = derived(
         1.2e-4,

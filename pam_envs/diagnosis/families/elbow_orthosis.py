@@ -1,5 +1,10 @@
-"""Elbow orthosis as a diagnosable plant: angle, both pressures, torque and forces."""
+"""Elbow orthosis as a diagnosable plant: angle, both pressures, torque and forces.
 
+The pressure may change how far the friction of the bundles reaches, or how stiff it is (see
+:mod:`pam_envs.plants.elbow_orthosis.hysteresis`): the base has the one that fits better.
+"""
+
+import dataclasses
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, ClassVar
@@ -9,11 +14,19 @@ import numpy as np
 from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.families.adapted import with_bearing
-from pam_envs.diagnosis.families.antagonistic_joint import PAIRS, TITLES, difference_of
+from pam_envs.diagnosis.families.adapted import TAIL, with_bearing, with_yielding
+from pam_envs.diagnosis.families.antagonistic_joint import (
+    LEAST_BREAK,
+    PAIRS,
+    TITLES,
+    difference_of,
+)
+from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
+from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.elbow_orthosis import rows as K
+from pam_envs.plants.elbow_orthosis.hysteresis import REFERENCE_PRESSURE, elbow_hysteresis
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 BUNDLE: dict[str, dict[str, Any]] = {
@@ -41,6 +54,10 @@ FACTORS = {
 """Usual sizes of the elbow over those of a muscle, by their units: a pulley of 31.5 mm."""
 BREAKS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 """Breakaway torques [N m] at which the search for a sticking bearing begins."""
+FURTHER = 1.001
+"""Least contraction at which a bundle's force ends, over the stroke: just beyond it, as the plant
+demands."""
+BY_LENGTH, BY_PRESSURE = "maxwell_slip_length", "maxwell_slip"
 
 
 class BoundElbow(RegulatedFamily):
@@ -58,6 +75,55 @@ class BoundElbow(RegulatedFamily):
         if n:
             thresholds = np.array(self.plant.hysteresis.operator.thresholds)
             columns[:, K.LARGEST_LAG] = columns[:, first : first + n] @ thresholds
+
+    def free(self, name: str, **changes: Any) -> Free:
+        """Return the fit settings of a parameter; bundles do not end before the stroke does."""
+        component, _, entry = name.partition(".")
+        if entry == "largest_contraction":
+            length = getattr(self.plant, component).nominal_length
+            changes = {"low": FURTHER * self.plant.pulley.stroke / length, **changes}
+        return super().free(name, **changes)
+
+    def plant_of(self, column: Array) -> Any:
+        """Return the plant with the parameters of a column.
+
+        The friction depends on the ratios of the weights; their sum is that of the operator, which
+        must have a slope of 1 where the pressure drives it.
+        """
+        n, first = self.elements, self._weights
+        weights = column[first : first + n]
+        if self.plant.hysteresis.drive == "pressure" and weights.sum() > 0.0:
+            whole = sum(self.plant.hysteresis.operator.weights)
+            column = column.copy()
+            column[first : first + n] = weights * (whole / weights.sum())
+        return super().plant_of(column)
+
+    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
+        """Return starting values at which all friction yields smoothly.
+
+        At half of the full pressure it is that of the base, and there half of it is without
+        pressure.
+        """
+        thresholds = getattr(self.plant.hysteresis.operator, "thresholds", ())
+        weights = np.array([found.get(f"{WEIGHT}{k}]", 0.0) for k in range(len(thresholds))])
+        if not weights.sum() > 0.0:
+            return dict(found)
+        way = float(weights @ np.array(thresholds) / weights.sum())  # mean break [m]
+        law = {name: found[f"bundle_b.{name}"] for name in BUNDLE}
+        bundle = dataclasses.replace(self.plant.bundle_b, **law)
+        usual = 0.5 * self.plant.full_pressure
+        now, there = (float(bundle.factor(p)) for p in (usual, REFERENCE_PRESSURE))
+        nearer = 0.5 * now / there if self.plant.hysteresis.drive == "length" else 1.0
+        force = 0.5 * found["hysteresis.loop"] * float(bundle.shape(0.0)) * now / bundle.muscles
+        away = nearer * way / bundle.nominal_length
+        return {
+            **found,
+            "hysteresis.loop": self.free("hysteresis.loop").low,
+            "hysteresis.yield_force": 0.5 * force,
+            "hysteresis.yield_per_pressure": 0.5 * force / usual,
+            "hysteresis.yield_break": max(away, LEAST_BREAK),
+            "hysteresis.yield_ratio": 0.5,
+        }
 
     def signals(self, recording: Recording, outputs: Array) -> Signals:
         """Return the angle and the difference of the pressures, positive in flexion."""
@@ -78,7 +144,7 @@ class ElbowKind(RegulatedKind):
     renamed = ({"position": "angle", "mass": "link"},)
     factors = FACTORS
     titles = TITLES
-    catalogue = with_bearing("link", BREAKS)
+    catalogue = with_yielding(with_bearing("link", BREAKS), (TAIL,), "hysteresis")
 
     def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundElbow:
         """Return an orthosis with the inputs of a recording; ValueError with on/off valves."""
@@ -90,6 +156,13 @@ class ElbowKind(RegulatedKind):
             )
         bound: BoundElbow = super().bind(plant, recording, sheet)
         return bound
+
+    def rival(self, plant: Any) -> Any:
+        """Return the orthosis whose pressure changes the stiffness of the friction."""
+        if plant.hysteresis.kind != BY_LENGTH:
+            return None
+        operator = elbow_hysteresis(BY_PRESSURE).operator
+        return plant.replace({"hysteresis.operator": operator})
 
     def commanded(self, plant: Any) -> tuple[str, ...]:
         """Return the inputs of the loop that are setpoints."""

@@ -20,8 +20,6 @@ from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.families.adapted import with_bearing, with_correction
 from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
-from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.calibrate import Calibration
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.single_muscle import grouped
 from pam_envs.diagnosis.plant_protocol import Loop, Signals
@@ -67,8 +65,6 @@ USUAL_STRETCH = 0.2
 BY_LENGTH = "maxwell_slip_length"
 WEIGHT_SCALE = 0.1
 """Meaningful change of the weight of an element, over that with which it has all friction."""
-DRIVE_GAIN = 0.1
-"""Gain on held-out blocks from which the friction of a base follows the length."""
 
 
 CORRECTED = (
@@ -170,25 +166,11 @@ class KneeKind(RegulatedKind):
         bound: BoundKnee = super().bind(plant, recording, sheet)
         return bound
 
-    def calibrate(
-        self,
-        family: Any,
-        measured: Array,
-        noise: Array,
-        blocks: Blocks,
-        time: Array,
-        shapes: Array,
-    ) -> Calibration:
-        """Fit the base with friction of the pressure; of the length if it is clearly better."""
-        data = measured, noise, blocks, time, shapes
-        found = super().calibrate(family, *data)
-        plant = family.plant
+    def rival(self, plant: Any) -> Any:
+        """Return the brace with friction of the length; None for a muscle that does not move."""
         if plant.mounting != MOVING or plant.hysteresis.drive == "length":
-            return found
-        rubbing = dataclasses.replace(plant, hysteresis=knee_hysteresis(BY_LENGTH))
-        other = super().calibrate(dataclasses.replace(family, plant=rubbing), *data)
-        gain = blocks.gain(found.base.errors, other.base.errors)
-        return other if gain > DRIVE_GAIN else found
+            return None
+        return dataclasses.replace(plant, hysteresis=knee_hysteresis(BY_LENGTH))
 
     def commanded(self, plant: Any) -> tuple[str, ...]:
         """Return the input of the loop that is the setpoint."""

@@ -53,6 +53,9 @@ FORGOTTEN, FIRST = 0.2, 5
 of readings of the rest at the start."""
 RANGE = "map_pressure", "map_least", "map_strain"
 """Parameters of the range of a correction."""
+DRIVE_GAIN = 0.1
+"""Gain on held-out blocks from which the friction of a base has the other drive: a tenth less of
+the mean square, beyond what the draw of the blocks changes."""
 NOISE = {"angle": 1e-3, "pressure": 1e3, "torque": 0.02, "force": 0.5, "tension": 1.0}
 """RMS of the noise [SI] where a recording shows none, by the first word of a channel."""
 
@@ -324,9 +327,22 @@ class RegulatedKind:
         time: Array,
         shapes: Array,
     ) -> Calibration:
-        """Fit regulators, then all base parameters."""
+        """Fit regulators, then all base parameters.
+
+        Of a plant with a rival, the base is the one that is clearly better.
+        """
         if family.measured_drive:
             measured = measured.copy()
             inputs = set(self.pairs_of(family.plant).values())
             measured[[c in inputs for c in family.channels]] = np.nan  # inputs are no outputs
-        return calibrate_compiled(family, measured, noise, blocks, time, shapes)
+        data = measured, noise, blocks, time, shapes
+        found, rival = calibrate_compiled(family, *data), self.rival(family.plant)
+        if rival is None:
+            return found
+        other = calibrate_compiled(dataclasses.replace(family, plant=rival), *data)
+        gain = blocks.gain(found.base.errors, other.base.errors)
+        return other if gain > DRIVE_GAIN else found
+
+    def rival(self, plant: Any) -> Any:
+        """Return a plant whose friction has the other drive; None where there is no choice."""
+        return None

@@ -1,12 +1,15 @@
 """Effects of the elbow orthosis: kernels that replace the placeholders.
 
 With proportional valves both bundles have all effects of their path; with on/off valves creep,
-first cycles and temperature. The bearing sticks and slips, and the sensors have their effects.
+first cycles and temperature. Friction of the bundles may yield smoothly. The bearing sticks and
+slips, and the sensors have their effects.
 """
 
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel
+from pam_envs.kernels.yielding import deflected_with_tail
+from pam_envs.muscle.effects import yield_spring
 from pam_envs.plants.core.muscle_path import (
     DELAYED,
     PATH_STATE,
@@ -37,6 +40,7 @@ FULL_SCALES = (2.1, 6e5, 6e5)
 """Full scales of the sensors: rad, Pa, Pa."""
 plain_exchange: Any = None  # placeholders: air of the plain plant
 plain_settle: Any = None
+spring_of: Any = None  # placeholder: spring of the yielding friction of a drive of the hysteresis
 
 
 @kernel
@@ -169,6 +173,62 @@ def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
     rows[EFFECTS_AT + K.STATE.stuck][j] = 1.0
 
 
+@kernel
+def begin_yield(rows: Any, j: int) -> None:
+    """Begin the yielding friction of both bundles of lane ``j`` at the middle of the range."""
+    for side in range(2):
+        rows[EFFECTS_AT + K.STATE.deflection + side][j] = 0.0
+        rows[EFFECTS_AT + K.STATE.yielded + side][j] = 0.0
+
+
+@kernel
+def spring_at_pressure(fixed: Any, j: int, first: int, drive: float) -> tuple[float, float]:
+    """Return :func:`yield_spring` where the pressure changes the stiffness, not the limit."""
+    stiff, limit = yield_spring(fixed, j, first, drive)
+    span = fixed[K.HYSTERESIS_YIELD_BREAK][j]
+    return stiff * limit / span, span
+
+
+@kernel
+def move_yield(rows: Any, fixed: Any, first: int, last: int) -> None:
+    """Move the yielding friction of the bundles of some lanes, and write its slope.
+
+    That of one muscle, at a bundle's travel over its nominal length, times their number.
+    """
+    for side in range(2):
+        deflection = rows[EFFECTS_AT + K.STATE.deflection + side]
+        yielded = rows[EFFECTS_AT + K.STATE.yielded + side]
+        stick, effective = (
+            rows[EFFECTS_AT + K.STATE.stick + side],
+            rows[EFFECTS_AT + K.STATE.effective + side],
+        )
+        sign, row = 2.0 * side - 1.0, side * len(K.BUNDLE)
+        for j in range(first, last):
+            length = fixed[row + K.BUNDLE.nominal_length][j]
+            stiff, limit = spring_of(fixed, j, K.EFFECT.soft, effective[j])
+            moved = sign * (rows[K.AT_A + side][j] - yielded[j]) / length
+            deflection[j], slope = deflected_with_tail(
+                deflection[j], moved, limit, fixed[K.HYSTERESIS_YIELD_RATIO][j],
+                fixed[K.HYSTERESIS_YIELD_TAIL][j],
+            )  # fmt: skip
+            yielded[j] = rows[K.AT_A + side][j]
+            stick[j] = fixed[row + K.BUNDLE.muscles][j] * stiff * slope / length
+
+
+@kernel
+def rub_of(rows: Any, fixed: Any, j: int, side: int, pressure: float) -> float:
+    """Return the yielding friction [N] against the contraction of a bundle at a pressure [Pa]."""
+    stiff, _ = spring_of(fixed, j, K.EFFECT.soft, pressure)
+    muscles = fixed[side * len(K.BUNDLE) + K.BUNDLE.muscles][j]
+    return muscles * stiff * rows[EFFECTS_AT + K.STATE.deflection + side][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def stick_of(rows: Any, j: int, side: int) -> float:
+    """Return the derivative [N/m] of :func:`rub_of` by contraction."""
+    return rows[EFFECTS_AT + K.STATE.stick + side][j]  # type: ignore[no-any-return]
+
+
 def bundle_kernels(valves: str, first: int) -> dict[str, Any]:
     """Return the kernels of the effects, whose state begins at row ``first``."""
     regulated = valves == "proportional"
@@ -181,4 +241,8 @@ def bundle_kernels(valves: str, first: int) -> dict[str, Any]:
         "settle": settle_regulated if regulated else settle_pulsed,
         "begin_muscles": begin_muscles,
         "begin_enclosed": begin_enclosed,
+        "begin_yield": begin_yield,
+        "move_yield": move_yield,
+        "rub_of": rub_of,
+        "stick_of": stick_of,
     }

@@ -24,6 +24,7 @@ same for both.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,8 @@ from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import ELEMENTS, HysteresisModel, RowsState, preset
 from pam_envs.hysteresis.slip import PreisachSlip, SlipModel
-from pam_envs.parameters import published
+from pam_envs.muscle.effects import LengthYieldTailEffects
+from pam_envs.parameters import declarations, published
 from pam_envs.plants.antagonistic_joint.hysteresis import PLAYS
 from pam_envs.plants.core.plant import OperatorComponent
 
@@ -53,12 +55,20 @@ are all within the paper's stroke of 66 mm, which is why the loop there is the l
 
 
 @dataclass(frozen=True)
-class ElbowHysteresis(DriveEffects, OperatorComponent):
+class ElbowHysteresis(DriveEffects, LengthYieldTailEffects, OperatorComponent):
     """Thread-on-thread friction of both bundles.
 
     ``operator`` turns travel [m] into the travel that the friction follows, with slope 1 and a
-    virgin start.
+    virgin start. Yielding friction acts beside it and is that of one muscle of a bundle, whose
+    strain is over the nominal length of the bundle. With an operator that is driven by the
+    pressure, this changes the stiffness of the yielding friction; with one driven by length the
+    strain at which it slips, so that it is passive.
     """
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        *DriveEffects.effects,
+        tuple(declarations(LengthYieldTailEffects)),
+    )
 
     loop: float = published(
         0.075,

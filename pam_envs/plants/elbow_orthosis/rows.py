@@ -45,8 +45,14 @@ globals().update(
             angle="noise resolution bias",
             pressure="noise resolution bias",
         ),
-        path_effects("bundle_a", "bundle_b", bearing="link", sensors=("angle", "pressure")),
-        each("effective crept", 2)
+        path_effects(
+            *("bundle_a", "bundle_b"),
+            bearing="link",
+            sensors=("angle", "pressure"),
+            yields="hysteresis",
+        )
+        | {"tail": ("hysteresis.yield_tail",)},
+        each("effective crept deflection yielded stick", 2)
         | {"paths": 2 * PATH_STATE.end, "stuck": 1, "sensors": sensor_rows(3)},
         {"model": NUMBERS, "largest_lag": 1},
         operators=2,

@@ -16,6 +16,7 @@ from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.guide import turn
 from pam_envs.mechanics.pulley import stop_torque
+from pam_envs.muscle.effects import yield_spring
 from pam_envs.plants.core.muscle_path import DELAYED, begin_delay
 from pam_envs.plants.core.sensors import begin_sensors, read_sensors
 from pam_envs.plants.elbow_orthosis import rows as K
@@ -34,7 +35,7 @@ from pam_envs.plants.elbow_orthosis.bundles import (
     travel_at,
     weight_of,
 )
-from pam_envs.plants.elbow_orthosis.effects import bundle_kernels
+from pam_envs.plants.elbow_orthosis.effects import bundle_kernels, spring_at_pressure
 from pam_envs.plants.elbow_orthosis.hysteresis import REFERENCE_PRESSURE
 
 SOFTEST = 0.1
@@ -64,6 +65,28 @@ def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
+def begin_yield(rows: Any, j: int) -> None:
+    """Begin the yielding friction of the bundles of one lane: a plain plant has none."""
+
+
+@kernel
+def move_yield(rows: Any, fixed: Any, first: int, last: int) -> None:
+    """Move the yielding friction of the bundles to their travels: a plain plant has none."""
+
+
+@kernel
+def rub_of(rows: Any, fixed: Any, j: int, side: int, pressure: float) -> float:
+    """Return the yielding friction [N] against the contraction of a bundle at a pressure [Pa]."""
+    return 0.0
+
+
+@kernel
+def stick_of(rows: Any, j: int, side: int) -> float:
+    """Return the derivative [N/m] of :func:`rub_of` by contraction."""
+    return 0.0
+
+
+@kernel
 def lag_of(rows: Any, j: int, side: int) -> float:
     """Return the hysteresis lag [m] of the travel that a bundle has."""
     return rows[K.LAG_A + side * (OPERATORS - 1)][j]  # type: ignore[no-any-return]
@@ -71,14 +94,14 @@ def lag_of(rows: Any, j: int, side: int) -> float:
 
 @kernel
 def pulled_by_length(
-    fixed: Any, j: int, side: int, angle: float, lag: float, pressure: float
+    fixed: Any, j: int, side: int, angle: float, lag: float, rub: float, pressure: float
 ) -> tuple[float, float, float]:
     """Return :func:`pulled` with friction of constant stiffness, whose limit has the pressure."""
     shape, slope = shape_of(fixed, j, side, contraction_at(fixed, j, side, angle))
     passive, pressed = factors_of(fixed, j, side)
     factor = passive + pressed * pressure
     stiff = passive + pressed * REFERENCE_PRESSURE
-    force = factor * shape - stiff * friction_of(fixed, j, side, lag)
+    force = factor * shape - stiff * friction_of(fixed, j, side, lag) - rub
     tight = 1.0 if force > 0.0 else 0.0
     return tight * force, tight * factor * slope, tight * pressed * shape
 
@@ -111,22 +134,25 @@ def slide(
         rows, fixed, counts, table, hysteresis, elements, K.AT_A, K.LAG_A, OPERATORS, K.MODEL,
         K.STACK_COUNT, K.MEMBER, first, last,
     )  # fmt: skip
+    move_yield(rows, fixed, first, last)
 
 
 @kernel
 def pulled_at_pressure(
-    fixed: Any, j: int, side: int, angle: float, lag: float, pressure: float
+    fixed: Any, j: int, side: int, angle: float, lag: float, rub: float, pressure: float
 ) -> tuple[float, float, float]:
     """Return the force of a bundle [N], and its growth with contraction [N/m] and pressure [m2].
 
-    The growth with contraction is the law's, at a held pressure; all are 0 for a slack bundle.
+    ``rub`` is the yielding friction [N]. The growth with contraction is the law's, at a held
+    pressure; all are 0 for a slack bundle.
     """
     shape, slope = shape_of(fixed, j, side, contraction_at(fixed, j, side, angle))
     passive, pressed = factors_of(fixed, j, side)
     factor = passive + pressed * pressure
     felt = shape - friction_of(fixed, j, side, lag)
-    tight = 1.0 if factor * felt > 0.0 else 0.0
-    return tight * factor * felt, tight * factor * slope, tight * pressed * felt
+    force = factor * felt - rub
+    tight = 1.0 if force > 0.0 else 0.0
+    return tight * force, tight * factor * slope, tight * pressed * felt
 
 
 @kernel
@@ -166,10 +192,12 @@ def middle_torque(rows: Any, fixed: Any, j: int, work: Any) -> tuple[float, floa
     new = old
     for side in range(2):
         sign, lag = 2.0 * side - 1.0, lag_of(rows, j, side)
-        was, soft, _ = pulled(fixed, j, side, angle, lag, work[WAS_A + side][j])
-        now, hard, swell = pulled(fixed, j, side, angle, lag, work[NOW_A + side][j])
+        before, after = work[WAS_A + side][j], work[NOW_A + side][j]
+        rub, rubs = rub_of(rows, fixed, j, side, before), rub_of(rows, fixed, j, side, after)
+        was, soft, _ = pulled(fixed, j, side, angle, lag, rub, before)
+        now, hard, swell = pulled(fixed, j, side, angle, lag, rubs, after)
         old, new = old + sign * radius * was, new + sign * radius * now
-        growth = 0.5 * (soft + hard) - swell * work[GIVES_A + side][j]
+        growth = 0.5 * (soft + hard) - swell * work[GIVES_A + side][j] - stick_of(rows, j, side)
         slope = slope - radius * radius * growth
     return old, new, slope
 
@@ -232,7 +260,8 @@ def report(rows: Any, fixed: Any, j: int) -> None:
     torque, stiffness, slack = 0.0, 0.0, 0.0
     for side in range(2):
         effective = rows[EFFECTIVE + side][j]
-        force, growth, _ = pulled(fixed, j, side, angle, lag_of(rows, j, side), effective)
+        lag, rub = lag_of(rows, j, side), rub_of(rows, fixed, j, side, effective)
+        force, growth, _ = pulled(fixed, j, side, angle, lag, rub, effective)
         rows[K.CONTRACTION_A + side][j] = contraction_at(fixed, j, side, angle)
         rows[K.FORCE_A + side][j] = force
         torque = torque + (2.0 * side - 1.0) * radius * force
@@ -281,7 +310,8 @@ def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
     torque, _ = passive_torque(fixed, j, angle)
     for side in range(2):
         effective = rows[EFFECTIVE + side][j]
-        force, _, _ = pulled(fixed, j, side, angle, lag_of(rows, j, side), effective)
+        lag, rub = lag_of(rows, j, side), rub_of(rows, fixed, j, side, effective)
+        force, _, _ = pulled(fixed, j, side, angle, lag, rub, effective)
         torque = torque + (2.0 * side - 1.0) * fixed[K.PULLEY_RADIUS][j] * force
     return torque + rows[K.DRIVE][j] + rows[K.DISTURBANCE][j] - fixed[K.WEARER_STIFFNESS][j] * angle
 
@@ -305,6 +335,7 @@ def begin_lane(
     for _ in range(54):
         angle = 0.5 * (low + high)
         start_hysteresis(rows, counts, hysteresis, j)
+        begin_yield(rows, j)
         rows[K.AT_A][j] = travel_at(fixed, j, angle)
         slide(rows, fixed, counts, table, hysteresis, elements, j, j + 1)
         if resting_torque(rows, fixed, j, angle) > 0.0:
@@ -353,7 +384,9 @@ def replacements(kind: str, valves: str, effects: int | None = None) -> dict[str
     kernels = protocol.kernels(kind) | {"start_air": STARTS[valves], "OPERATORS": operators(kind)}
     if operators(kind) == 2:
         kernels |= {"pulled": pulled_by_length, "set_limits": write_limits}
+        kernels |= {"spring_of": yield_spring}
     else:
         kernels |= {"pulled": pulled_at_pressure, "set_limits": leave_limits}
+        kernels |= {"spring_of": spring_at_pressure}
     extended = {} if effects is None else bundle_kernels(valves, effects)
     return kernels | AIR[valves] | extended

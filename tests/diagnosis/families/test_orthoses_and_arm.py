@@ -163,6 +163,24 @@ def test_largest_lag_of_the_elbow_follows_the_weights_of_its_friction():
     assert columns[0, :-1] == pytest.approx(found.parameter_rows(), rel=1e-12)
 
 
+def test_elbow_with_friction_of_the_pressure_is_found_for_any_sum_of_weights():
+    kind = kind_named("elbow_orthosis")
+    plant = kind.rival(kind.start(Rig(plant="elbow_orthosis")))
+    ramp = np.linspace(0.5e5, 2e5, 40)
+    inputs = {"set_point_a": ramp[::-1].copy(), "set_point_b": ramp}
+    made = Recording.of_channels(
+        0.02 * np.arange(len(ramp)), inputs, {"angle": np.zeros(len(ramp))}, plant=plant.family
+    )
+    bound = kind.bind(plant, made, Rig())
+    columns = np.tile(bound.column, (2, 1))
+    columns[0, bound.free("hysteresis.weight[0]").place] = 0.9
+    bound.tie(columns)
+    columns[1, :-1] = bound.plant_of(columns[0]).parameter_rows()
+    given, found = np.moveaxis(bound.simulate(columns), 2, 0)
+    assert np.ptp(given[0]) > 0.01
+    assert found == pytest.approx(given, rel=1e-9)
+
+
 def test_variants_that_cannot_be_replayed_are_refused_with_a_remedy():
     n = 12
     made = Recording.of_channels(

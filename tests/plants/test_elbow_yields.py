@@ -1,0 +1,68 @@
+"""Yielding friction of the bundles of the elbow orthosis, for both drives of the hysteresis."""
+
+import numpy as np
+import pytest
+
+from pam_envs.kernels.yielding import deflected_with_tail
+from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
+from pam_envs.plants.elbow_orthosis.rollout import simulate_elbow
+
+YIELDING = {
+    "hysteresis.loop": 0.0,
+    "hysteresis.yield_force": 1.2,
+    "hysteresis.yield_per_pressure": 4e-6,
+    "hysteresis.yield_break": 0.004,
+    "hysteresis.yield_ratio": 0.4,
+    "hysteresis.yield_tail": 0.7,
+}
+SETTLED = 100
+"""Control periods until the friction has forgotten its start."""
+
+
+@pytest.fixture(scope="module", params=["maxwell_slip_length", "maxwell_slip"])
+def motion(request):
+    """Record an elbow whose bundles stay taut.
+
+    Return the plant, and of bundles a and b pressures [Pa], contractions [m] and the friction [N]
+    that is missing in their forces, each (2, T).
+    """
+    plant = ElbowOrthosis.paper(request.param).with_lag_alone().replace(YIELDING)
+    phase = 2.0 * np.pi * np.arange(400) / 200
+    swing = 0.6e5 * np.sin(phase) + 0.3e5 * np.sin(3.0 * phase)
+    commands = np.stack([2e5 - swing, 1.2e5 + swing], axis=1)
+    made = simulate_elbow(plant, commands, intent=1.0, compiled=False)
+    assert not made["slack"].any()
+    pressure, contraction, force = (
+        np.stack([made[f"{name}_{side}"] for side in "ab"])
+        for name in ("pressure", "contraction", "force")
+    )
+    bundles = plant.bundle_a, plant.bundle_b
+    law = np.stack([b.law(p, c) for b, p, c in zip(bundles, pressure, contraction, strict=True)])
+    return plant, pressure, contraction, law - force
+
+
+def test_friction_is_that_of_the_muscles_and_follows_their_contraction(motion):
+    plant, pressure, contraction, friction = motion
+    own, drive = plant.hysteresis, plant.hysteresis.drive
+    for m, bundle in enumerate((plant.bundle_a, plant.bundle_b)):
+        strain, z = contraction[m] / bundle.nominal_length, 0.0
+        before, expected = strain[0], np.zeros(len(strain))
+        for t, (p, e) in enumerate(zip(pressure[m], strain, strict=True)):
+            grown = 1.0 + own.yield_per_pressure * p / own.yield_force
+            reach = own.yield_break * (grown if drive == "length" else 1.0)
+            z = deflected_with_tail(z, e - before, reach, own.yield_ratio, own.yield_tail)[0]
+            stiff = own.yield_force / own.yield_break * (1.0 if drive == "length" else grown)
+            before, expected[t] = e, bundle.muscles * stiff * z
+        largest = np.abs(expected[SETTLED:]).max()
+        assert largest > 0.8 * bundle.muscles * own.yield_force
+        assert friction[m, SETTLED:] == pytest.approx(expected[SETTLED:], abs=0.02 * largest)
+
+
+def test_friction_lowers_the_force_of_the_bundle_that_contracts(motion):
+    plant, _, contraction, friction = motion
+    for m, bundle in enumerate((plant.bundle_a, plant.bundle_b)):
+        speed = np.gradient(contraction[m])
+        quick = np.abs(speed) > 0.7 * np.abs(speed).max()
+        quick[:SETTLED] = False
+        along = np.sign(speed[quick]) * friction[m, quick]
+        assert along.mean() > 0.5 * bundle.muscles * plant.hysteresis.yield_force
