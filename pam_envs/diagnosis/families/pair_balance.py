@@ -3,8 +3,8 @@
 At slow motion the torques of both muscles balance weight and payload. The law of the muscles is
 linear in its coefficients, and so is the friction for given limits of its elements. The target is
 the torque of the pressures on the usual area, since most samples have no other known torque; the
-payload gives the scale. Errors of the torque are weighed by the compliance, so that the regression
-minimises errors of the angle.
+payload gives the scale, and without one the area keeps its usual value. Errors of the torque are
+weighed by the compliance, so that the regression minimises errors of the angle.
 
 The flexible regression also has the terms of the law's correction and a difference of the muscles.
 This difference multiplies the law: its derivative at the coefficients of one round is a term of the

@@ -131,6 +131,46 @@ def test_every_output_of_a_recording_is_simulated(name):
     assert len(set(bound.loop.outputs)) == len(bound.channels)
 
 
+def bound_arm(plant, **outputs):
+    time = PERIOD * np.arange(12)
+    inputs = {f"set_point_{m}": np.full(12, 1.5e5) for m in range(2 * plant.stages)}
+    made = Recording.of_channels(time, inputs, outputs, plant=plant.family)
+    return kind_named(plant.family).bind(plant, made, Rig(plant=plant.family))
+
+
+def test_area_of_an_arm_is_fitted_if_torques_or_forces_show_more_than_its_masses():
+    plant, angle = family_rigs.ARM.start, np.zeros(12)
+    names = {free.name for free in bound_arm(plant, angle_0=angle).base()}
+    assert {"arm.mass_factor", "link.damping"} <= names
+    assert not {"muscle.area", "arm.damping_factor"} & names  # the joints have no damping of theirs
+    for more in ("torque_1", "force_0"):
+        loaded = bound_arm(plant, angle_0=angle, **{more: np.ones(12)})
+        assert "muscle.area" in {free.name for free in loaded.base()}
+    damped = dataclasses.replace(plant, joint_damping=(0.1, 0.1))
+    assert "arm.damping_factor" in {f.name for f in bound_arm(damped, angle_0=angle).base()}
+
+
+@needs_kernels
+def test_balance_of_torques_of_an_arm_starts_its_fit_near_the_readings():
+    """Muscles of another law, which are taut at the pressures of the recording."""
+    rig, kind = family_rigs.ARM, kind_named("redundant_manipulator")
+    taut = {"muscle__threshold": 0.0, "muscle__braid_force": 30.0, "muscle__braid_strain": 0.04}
+    recording, truth = rig.recorded(**taut), rig.truth(**taut)
+    family = kind.bind(rig.start, recording, rig.sheet)
+    missing = np.full(len(recording.time), np.nan)
+    measured = np.array([recording.outputs.get(name, missing) for name in family.channels])
+    columns = np.tile(family.column, (2, 1))
+    for name in ("regulator.time_constant", "regulator.dead_time"):
+        columns[:, family.free(name).place] = truth.value(name)
+    noise = np.array([rig.noise.get(name, 1.0) for name in family.channels])
+    found, _ = family.guesses(measured, noise, columns[0])
+    for name, value in found.items():
+        columns[1, family.free(name).place] = value
+    left = family.simulate(columns)[:2] - measured[:2, :, None]  # angles
+    usual, guessed = np.sqrt(np.mean(left**2, axis=(0, 1)))
+    assert guessed < 0.3 * usual
+
+
 @pytest.mark.parametrize("family", ["ELBOW", "HELD", "ARM"])
 def test_replay_of_a_recording_is_that_of_the_plant(family):
     rig = getattr(family_rigs, family)
