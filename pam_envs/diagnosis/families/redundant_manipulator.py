@@ -72,6 +72,17 @@ class BoundArm(PairFamily):
             idle.add("arm.damping_factor")
         return tuple(free for free in super().base() if free.name not in idle)
 
+    def guesses(
+        self, measured: Array, noise: Array, column: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Return starting values of the flexible base from the balance of torques.
+
+        The base starts from its plant: where most muscles are slack, only light links balance
+        their torques, and a regression on the law alone led fits into another valley.
+        """
+        _, wide = super().guesses(measured, noise, column)
+        return {}, wide
+
     def weights_at(self, angles: Array, payload: Array | float) -> Array:
         """Return the torques of weight and payload [kg] at angles (n, T) [rad], (n, T)."""
         return np.asarray(self.plant.weight_torque(angles.T, payload).T)
