@@ -150,27 +150,6 @@ def test_area_of_an_arm_is_fitted_if_torques_or_forces_show_more_than_its_masses
     assert "arm.damping_factor" in {f.name for f in bound_arm(damped, angle_0=angle).base()}
 
 
-@needs_kernels
-def test_balance_of_torques_of_an_arm_starts_its_fit_near_the_readings():
-    """Muscles of another law, which are taut at the pressures of the recording."""
-    rig, kind = family_rigs.ARM, kind_named("redundant_manipulator")
-    taut = {"muscle__threshold": 0.0, "muscle__braid_force": 30.0, "muscle__braid_strain": 0.04}
-    recording, truth = rig.recorded(**taut), rig.truth(**taut)
-    family = kind.bind(rig.start, recording, rig.sheet)
-    missing = np.full(len(recording.time), np.nan)
-    measured = np.array([recording.outputs.get(name, missing) for name in family.channels])
-    columns = np.tile(family.column, (2, 1))
-    for name in ("regulator.time_constant", "regulator.dead_time"):
-        columns[:, family.free(name).place] = truth.value(name)
-    noise = np.array([rig.noise.get(name, 1.0) for name in family.channels])
-    found, _ = family.guesses(measured, noise, columns[0])
-    for name, value in found.items():
-        columns[1, family.free(name).place] = value
-    left = family.simulate(columns)[:2] - measured[:2, :, None]  # angles
-    usual, guessed = np.sqrt(np.mean(left**2, axis=(0, 1)))
-    assert guessed < 0.3 * usual
-
-
 @pytest.mark.parametrize("family", ["ELBOW", "HELD", "ARM"])
 def test_replay_of_a_recording_is_that_of_the_plant(family):
     rig = getattr(family_rigs, family)
