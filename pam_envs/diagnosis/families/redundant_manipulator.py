@@ -75,8 +75,23 @@ class BoundArm(PairFamily):
     def guesses(
         self, measured: Array, noise: Array, column: Array
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """Return no starting values: the links weigh too little for a balance of torques."""
-        return {}, {}
+        """Return starting values of the flexible base from the balance of torques.
+
+        They show a difference of the muscles, which may lead the fit of the base astray. The base
+        starts from its plant: where most muscles are slack, only light links balance their torques,
+        and a regression on the law alone leads fits into another valley.
+        """
+        _, wide = super().guesses(measured, noise, column)
+        return {}, wide
+
+    def weights_at(self, angles: Array, payload: Array | float) -> Array:
+        """Return the torques of weight and payload [kg] at angles (n, T) [rad], (n, T)."""
+        return np.asarray(self.plant.weight_torque(angles.T, payload).T)
+
+    def named(self, found: dict[str, float]) -> dict[str, float]:
+        """Return a guess whose factor on the own weight is that on the masses."""
+        factor = found.pop("weight", 1.0)
+        return {**found, "arm.mass_factor": factor * self.plant.arm.mass_factor} if found else {}
 
     def signal_rows(self) -> Mapping[str, int]:
         """Return the row of state of each torque and force."""

@@ -150,6 +150,22 @@ def test_area_of_an_arm_is_fitted_if_torques_or_forces_show_more_than_its_masses
     assert "arm.damping_factor" in {f.name for f in bound_arm(damped, angle_0=angle).base()}
 
 
+@needs_kernels
+def test_balance_of_torques_of_an_arm_starts_its_flexible_base_near_the_imbalance():
+    rig, kind = family_rigs.ARM, kind_named("redundant_manipulator")
+    recording, truth = rig.recorded(muscle__imbalance=0.06), rig.truth()
+    family = kind.bind(rig.start, recording, rig.sheet)
+    missing = np.full(len(recording.time), np.nan)
+    measured = np.array([recording.outputs.get(name, missing) for name in family.channels])
+    family, column = family.spanning(measured), family.column
+    for name in ("regulator.time_constant", "regulator.dead_time"):
+        column[family.free(name).place] = truth.value(name)
+    noise = np.array([rig.noise.get(name, 1.0) for name in family.channels])
+    of_base, found = family.guesses(measured, noise, column)
+    assert not of_base
+    assert found["muscle.imbalance"] == pytest.approx(0.06, abs=0.02)
+
+
 @pytest.mark.parametrize("family", ["ELBOW", "HELD", "ARM"])
 def test_replay_of_a_recording_is_that_of_the_plant(family):
     rig = getattr(family_rigs, family)
