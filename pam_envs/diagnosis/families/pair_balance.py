@@ -3,8 +3,8 @@
 At slow motion the torques of both muscles balance weight and payload. The law of the muscles is
 linear in its coefficients, and so is the friction for given limits of its elements. The target is
 the torque of the pressures on the usual area, since most samples have no other known torque; the
-payload gives the scale. Errors of the torque are weighed by the compliance, so that the regression
-minimises errors of the angle.
+payload gives the scale, and without one the area keeps its usual value. Errors of the torque are
+weighed by the compliance, so that the regression minimises errors of the angle.
 
 The flexible regression also has the terms of the law's correction and a difference of the muscles.
 This difference multiplies the law: its derivative at the coefficients of one round is a term of the
@@ -112,19 +112,24 @@ class PairBalance:
         return np.array(made)
 
     @cached_property
-    def _slow(self) -> Flags:
-        """Samples (T,) at which all joints have moved slowly for some way.
+    def _balanced(self) -> Flags:
+        """Samples (n, T) of each joint that moved slowly for some way, while all joints are slow.
 
-        A fast motion may overshoot, and leaves the friction in a state that the readings hide.
+        A fast motion may overshoot, and leaves the friction in a state that the readings hide; that
+        of another joint only shakes this one.
         """
         window = max(3, round(2.0 * WINDOW / self.period))
         speed = np.abs(np.gradient(self._smooth, self.period, axis=1))
-        slow = uniform_filter1d(speed.max(axis=0), window) < SLOW
-        way = np.cumsum(speed.min(axis=0)) * self.period
-        since = np.maximum.accumulate(np.where(slow, 0.0, way))
-        slow &= (way - since > SETTLED) & np.isfinite(self.angle).all(axis=0)
-        rows = np.flatnonzero(slow)
-        kept = np.zeros(len(slow), bool)
+        slow = uniform_filter1d(speed, window, axis=1) < SLOW
+        way = np.cumsum(speed, axis=1) * self.period
+        since = np.maximum.accumulate(np.where(slow, 0.0, way), axis=1)
+        return (way - since > SETTLED) & slow.all(axis=0) & np.isfinite(self.angle)
+
+    @cached_property
+    def _slow(self) -> Flags:
+        """Samples (T,) of the regression: at most :data:`MOST` at which a joint is in balance."""
+        rows = np.flatnonzero(self._balanced.any(axis=0))
+        kept = np.zeros(self.angle.shape[1], bool)
         kept[rows[:: max(1, len(rows) // MOST)]] = True
         return kept
 
@@ -191,6 +196,7 @@ class PairBalance:
         joints = len(self.angle)
         side = np.tile([1.0, -1.0], joints)[:, None]
         weight, carried = self.weight[:, rows], self.carried[:, rows]
+        balanced = self._balanced[:, rows]
         number = len(forces) + flexible
         limits, usual = self._limits(number + 1, flexible), self.plant.muscle.area
         stiff = np.full(weight.shape, 1.0)
@@ -205,7 +211,7 @@ class PairBalance:
             torque = by_muscle.reshape(number, joints, 2, -1).sum(axis=2)
             opposed = np.stack([weight, carried])
             columns = np.concatenate([-torque[1:], opposed]).reshape(number + 1, -1)
-            kept = taut.reshape(joints, 2, -1).all(axis=1) if k == 0 else np.ones_like(weight, bool)
+            kept = balanced & taut.reshape(joints, 2, -1).all(axis=1) if k == 0 else balanced
             floor = LEAST_STIFF * float(np.median(stiff))
             weights = (kept / (np.maximum(stiff, floor) * self.noise)).ravel()
             regression = Regression(columns, usual * torque[0].ravel(), weights, limits)

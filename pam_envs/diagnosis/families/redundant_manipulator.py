@@ -5,6 +5,7 @@ the default's is given as a plant.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -13,36 +14,40 @@ import numpy as np
 from pam_envs.arrays import Array
 from pam_envs.data.recording.channels import arm_channels
 from pam_envs.data.recording.recording import Recording
-from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.families.adapted import with_yielding
+from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.families.antagonistic_joint import (
     MUSCLES,
-    UNEQUAL,
     JointKind,
     PairFamily,
     difference_of,
 )
+from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.single_muscle import CLOCK
 from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import JOINT_OUTPUTS, MUSCLE_OUTPUTS
 
 SETTINGS: dict[str, dict[str, Any]] = {
-    **{name: values for name, values in MUSCLES.items() if name != "muscle.braid_strain"},
+    **MUSCLES,
     "arm.mass_factor": {"log": True, "prior": 0.7},
     "arm.damping_factor": {"log": True, "low": 1e-2, "prior": 1.5},
-    "hysteresis.base": {"log": True, "low": 1.0, "prior": 1.5},
-    "hysteresis.rate": {"log": True, "low": 1e-6, "prior": 1.5},
+    "link.damping": {"log": True, "low": 1e-3, "prior": 1.5},
 }
-"""Base parameters with the settings of their fits. The law of the muscles keeps its shape: with a
-free one the fits stall, and a corrected law explains the rest."""
+"""Base parameters with the settings of their fits."""
 
 
+@dataclass(frozen=True)
 class BoundArm(PairFamily):
-    """Arm with the inputs of a recording."""
+    """Arm with the inputs of a recording.
+
+    ``loaded``: whether torques or forces are recorded. If not, forces are known only over the
+    masses: the area then keeps its value, and the factor of the masses is relative to it.
+    """
+
+    loaded: bool = False
 
     settings: ClassVar[Mapping[str, Mapping[str, Any]]] = SETTINGS
-    last: ClassVar[tuple[str, ...]] = (CLOCK,)
+    last: ClassVar[tuple[str, ...]] = ("muscle.braid_strain", CLOCK)
     limits: ClassVar[tuple[bool, ...]] = (False, True)
 
     @cached_property
@@ -60,11 +65,33 @@ class BoundArm(PairFamily):
         joints = range(self.plant.stages)
         return [(f"angle_{k}", (f"pressure_{2 * k}", f"pressure_{2 * k + 1}")) for k in joints]
 
+    def base(self) -> tuple[Free, ...]:
+        """Return the base parameters that a recording may show."""
+        idle = set() if self.loaded else {"muscle.area"}
+        if not any(self.plant.joint_damping):
+            idle.add("arm.damping_factor")
+        return tuple(free for free in super().base() if free.name not in idle)
+
     def guesses(
         self, measured: Array, noise: Array, column: Array
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """Return no starting values: the arm weighs too little for a balance of torques."""
-        return {}, {}
+        """Return starting values of the flexible base from the balance of torques.
+
+        They show a difference of the muscles, which may lead the fit of the base astray. The base
+        starts from its plant: where most muscles are slack, only light links balance their torques,
+        and a regression on the law alone leads fits into another valley.
+        """
+        _, wide = super().guesses(measured, noise, column)
+        return {}, wide
+
+    def weights_at(self, angles: Array, payload: Array | float) -> Array:
+        """Return the torques of weight and payload [kg] at angles (n, T) [rad], (n, T)."""
+        return np.asarray(self.plant.weight_torque(angles.T, payload).T)
+
+    def named(self, found: dict[str, float]) -> dict[str, float]:
+        """Return a guess whose factor on the own weight is that on the masses."""
+        factor = found.pop("weight", 1.0)
+        return {**found, "arm.mass_factor": factor * self.plant.arm.mass_factor} if found else {}
 
     def signal_rows(self) -> Mapping[str, int]:
         """Return the row of state of each torque and force."""
@@ -88,8 +115,12 @@ class ArmKind(JointKind):
     plant = RedundantManipulator
     loop = Loop("PAM/RedundantManipulator-v0", "joint_mfc_mu", "mm", 1e-3, "drawn")
     bound = BoundArm
-    catalogue = (*(c for c in with_yielding(catalogue()) if c.name != "static_law"), UNEQUAL)
 
     def pairs_of(self, plant: Any) -> Mapping[str, str]:
         """Return the name of each setpoint and that of its pressure."""
         return arm_channels(plant.stages).measured
+
+    def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundArm:
+        """Return an arm with the inputs of a recording."""
+        loaded = any(name.startswith(("torque", "force")) for name in recording.outputs)
+        return replace(super().bind(plant, recording, sheet), loaded=loaded)

@@ -1,4 +1,4 @@
-"""Diagnosis of joints in worlds whose laws of force, friction and regulators are not the package's.
+"""Diagnosis of joints, knees and arms in worlds of other laws of force, friction and regulators.
 
 The rigs are those of :mod:`tests.diagnosis.pair_worlds`, in the world with regulators of first
 order; every one departs from the base in static law, loops, dead time and rate limit.
@@ -7,6 +7,7 @@ order; every one departs from the base in static law, loops, dead time and rate 
 import numpy as np
 import pytest
 
+from benchmarks.diagnosis.families.cases import start_of
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.noise import noise_floor
@@ -54,6 +55,17 @@ def test_knee_of_another_world_has_friction_of_the_length_and_a_corrected_law():
     means = study.blocks.means(study.normal.errors)
     some = study.blocks.counts.sum(axis=1) > 0
     assert np.sqrt(means[some]).max() < 3.0
+
+
+@needs_kernels
+def test_flexible_base_of_an_arm_has_a_corrected_law_and_friction_that_yields_in_another_world():
+    recording, sheet = record("redundant_manipulator", "exponential", 700_002)
+    kind, start = kind_named("redundant_manipulator"), start_of("redundant_manipulator")
+    study = Study.begin(recording, sheet, start, noise_floor(recording, sheet), kind)
+    study.make_flexible(kind.causes(kind.catalogue))
+    assert set(study.normal.names) == {"static_law", "hysteresis_shape"}
+    left = study.blocks.means(study.normal.errors)[:2]  # of the angles
+    assert np.sqrt(left).max() < 4.0 < 10.0 < np.sqrt(study.blocks.means(study.base.errors)[0])
 
 
 @needs_kernels
