@@ -180,12 +180,8 @@ class FlexibleBase:
         while any(cause.common for cause, _ in model.causes):
             expected = self.expected(model)
             limit, clear = (OBVIOUS, CLEAR) if self.linear else (np.inf, np.inf)
-            named = {c.name: self.least_gain_of(c, model) for c, _ in model.causes}
-            doubtful = {
-                n
-                for n, gain in expected.items()
-                if gain <= max(limit, named[n]) and n not in needed
-            }
+            limits = {c.name: max(limit, self.least_gain_of(c, model)) for c, _ in model.causes}
+            doubtful = {n for n, g in expected.items() if g <= limits[n] and n not in needed}
             smaller = without_each_cause(*data, model, doubtful, clear)
             losses = {name: self.loss(less, model) for name, less in smaller.items()}
             needed |= {name for name, loss in losses.items() if loss > CLEAR}
