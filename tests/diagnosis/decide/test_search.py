@@ -7,7 +7,7 @@ import pytest
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.decide.compare import cross_validate, showing_alone
-from pam_envs.diagnosis.decide.flexible_base import FlexibleBase
+from pam_envs.diagnosis.decide.flexible_base import OBVIOUS, FlexibleBase
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.screen import Screen
 from pam_envs.diagnosis.decide.search import converged
@@ -95,6 +95,23 @@ def test_difference_that_changes_nothing_is_dropped_and_the_others_stay():
     assert [f.name for f in less.fit.frees] == ["gain", "lag", "cube"]
     assert less.fit.values()["cube"] == pytest.approx(0.9)
     assert blocks.gain(less.errors, model.errors) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_difference_like_another_law_beside_one_is_named_only_with_its_own_gain():
+    line = Line()
+    causes = [
+        Cause(n, n, (Form(n, (Term(n, (0.1,)),)),), common=True, lawlike=True)
+        for n in ("slope", "offset")
+    ]
+    truth = np.array([1.2, 2.0, 0.6, 0.24, 0.0, 0.0])
+    problem, blocks, base = fitted(line, line.free("gain"), line.free("lag"), truth=truth)
+    flexible = FlexibleBase(problem, line, blocks, base, Rule())
+    model = flexible.fitted([(cause, cause.forms[0]) for cause in causes])
+    gain = flexible.expected(model)["offset"]
+    assert OBVIOUS < gain < Rule().lawlike_further
+    needed = flexible.needed(model)
+    assert needed.names == ("slope",)
+    assert "offset" in needed.fit.values()
 
 
 def test_form_behind_before_convergence_wins_after_it():
