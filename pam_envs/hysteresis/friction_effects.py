@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import kernel
-from pam_envs.kernels.yielding import yielded
+from pam_envs.kernels.yielding import yielded_with_tail
 from pam_envs.parameters import assumed, effect
 
 ELEMENTS = 4
@@ -103,6 +103,7 @@ class YieldEffects:
     yield_ratio: float = assumed(
         0.5, "1", 0.0, 1.0, "0: springs back after a reversal, 1: friction of Dahl"
     )
+    yield_tail: float = effect("1", -1.0, 1.0, "approach to full yield: -1 abrupt, 1 slow")
 
 
 @kernel
@@ -117,7 +118,7 @@ def yield_step(
     share, before = rows[state], rows[state + 1]
     for j in range(first, last):
         moved = (pressure[j] - before[j]) / fixed[width + 1][j]
-        share[j] = yielded(share[j], moved, fixed[width + 2][j])[0]
+        share[j], _ = yielded_with_tail(share[j], moved, fixed[width + 2][j], fixed[width + 3][j])
         before[j] = pressure[j]
 
 

@@ -24,7 +24,7 @@ from pam_envs.muscle.effects import (
     MAP,
     MAP_TERMS,
     LengthCreepEffects,
-    LengthYieldEffects,
+    LengthYieldTailEffects,
     LoadEffects,
     StaticMapEffects,
     StrandEffects,
@@ -45,7 +45,7 @@ _FIT = "least squares on positioning2021, Tables 3-5"
 class EffectiveAreaMuscle(
     StaticMapEffects,
     ViscosityEffects,
-    LengthYieldEffects,
+    LengthYieldTailEffects,
     StrandEffects,
     LengthCreepEffects,
     LoadEffects,
@@ -63,8 +63,9 @@ class EffectiveAreaMuscle(
         ("load_stiffening_2",),
         ("load_stiffening_root",),
         ("strand_1", "strand_2", "strand_3", "strand_4", "strand_break", "strand_per_pressure"),
-        ("yield_force", "yield_per_pressure", "yield_break", "yield_ratio"),
+        ("yield_force", "yield_per_pressure", "yield_break", "yield_ratio", "yield_tail"),
         ("viscosity", "viscosity_speed"),
+        ("viscosity_per_pressure", "viscosity_relaxing"),
         MAP._fields,
     )
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from pam_envs.constants import ROOM_TEMPERATURE
 from pam_envs.kernels.arithmetic import count_on
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.kernels.yielding import deflected
+from pam_envs.kernels.yielding import deflected_with_tail
 from pam_envs.parameters import assumed, declarations, effect, named_rows
 
 
@@ -45,16 +45,28 @@ def stiffening(weight: float, linear: float, square: float, root: float) -> floa
 
 @dataclass(frozen=True, kw_only=True)
 class ViscosityEffects:
-    """Damping at small speeds."""
+    """Damping beside the mass's: at small speeds, and that grows with the pressure.
+
+    The damping of a muscle grows with its pressure, and is smaller in relaxation (reynolds2003).
+    """
 
     viscosity: float = effect("N s/m", 0.0, 1e5, "damping at small speed beside the mass's")
     viscosity_speed: float = assumed(0.02, "m/s", 1e-4, 10.0, "speed that lowers it by 1 / sqrt(2)")
+    viscosity_per_pressure: float = effect(
+        "N s/(m Pa)", 0.0, 1.0, "damping over effective pressure, beside the mass's"
+    )
+    viscosity_relaxing: float = assumed(
+        1.0, "1", 0.0, 2.0, "viscosity_per_pressure in relaxation over contraction", neutral=1.0
+    )
 
 
 @kernel
-def viscous_damping(viscosity: float, speed: float, pace: float) -> float:
-    """Return the damping [N s/m] at a speed [m/s]."""
-    return viscosity / math.sqrt(1.0 + abs(speed) / pace)
+def viscous_damping(
+    viscosity: float, pace: float, per_pressure: float, relaxing: float, speed: float, drive: float
+) -> float:
+    """Return the damping [N s/m] at a speed of contraction [m/s] and an effective pressure [Pa]."""
+    grown = per_pressure * max(0.0, drive) * (relaxing if speed < 0.0 else 1.0)
+    return viscosity / math.sqrt(1.0 + abs(speed) / pace) + grown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,12 +191,15 @@ def yield_forces(
 ) -> None:  # fmt: skip
     """Add the yielding friction [N] and its slope by strain [N] after motions of a tile.
 
-    ``state`` is the row of the deflections, ``moved`` the strains gained since.
+    ``state`` is the row of the deflections, ``first`` the first row of
+    :class:`LengthYieldTailEffects`, ``moved`` the strains gained since.
     """
     deflection = rows[state]
     for j in range(LANES):
         stiff, limit = yield_spring(fixed, j, first, drive[j])
-        after, slope = deflected(deflection[j], moved[j], limit, fixed[first + 3][j])
+        after, slope = deflected_with_tail(
+            deflection[j], moved[j], limit, fixed[first + 3][j], fixed[first + 4][j]
+        )
         friction[j] = friction[j] + stiff * after
         sticking[j] = sticking[j] + stiff * slope
 
@@ -197,7 +212,9 @@ def yield_deflections(
     deflection = rows[state]
     for j in range(LANES):
         _, limit = yield_spring(fixed, j, first, drive[j])
-        deflection[j] = deflected(deflection[j], moved[j], limit, fixed[first + 3][j])[0]
+        deflection[j], _ = deflected_with_tail(
+            deflection[j], moved[j], limit, fixed[first + 3][j], fixed[first + 4][j]
+        )
 
 
 MAP_TERMS = (

@@ -45,23 +45,15 @@ def with_correction(
     return tuple(corrected if cause.name == law.name else cause for cause in causes)
 
 
-TAIL = Term("muscle.yield_tail", (0.0,), scale=0.3, amount=False, prior=3.0)
-"""How yielding friction approaches its largest value."""
-
-
-def with_yielding(
-    causes: Sequence[Cause], further: Sequence[Term] = (), component: str = "muscle"
-) -> tuple[Cause, ...]:
+def with_yielding(causes: Sequence[Cause], component: str = "muscle") -> tuple[Cause, ...]:
     """Return causes whose shape of the loops is friction of the length that yields smoothly.
 
-    For plants whose friction is driven by length anyway; ``further`` are terms of the friction
-    beside those of the catalogue, ``component`` is that with the friction.
+    For plants whose friction is driven by length anyway; ``component`` is that with the friction.
     """
     shape, drive = by_name("hysteresis_shape"), by_name("hysteresis_drive")
     form = next(form for form in drive.forms if form.name == "yielding")
     terms = [
-        replace(term, name=f"{component}.{term.name.partition('.')[2]}")
-        for term in (*form.terms, *further)
+        replace(term, name=f"{component}.{term.name.partition('.')[2]}") for term in form.terms
     ]
     made = replace(shape, forms=(replace(form, terms=tuple(terms)),))
     kept = (cause for cause in causes if cause.name != drive.name)

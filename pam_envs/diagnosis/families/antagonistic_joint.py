@@ -10,7 +10,6 @@ from pam_envs.constants import BAR, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.families.adapted import (
-    TAIL,
     with_bearing,
     with_correction,
     with_yielding,
@@ -220,7 +219,7 @@ class JointKind(RegulatedKind):
     factors = FACTORS
     titles = TITLES
     catalogue = (
-        *with_yielding(with_correction(with_bearing("link", BREAKS), "muscle", CORRECTED), (TAIL,)),
+        *with_yielding(with_correction(with_bearing("link", BREAKS), "muscle", CORRECTED)),
         UNEQUAL,
     )
 

@@ -14,7 +14,7 @@ import numpy as np
 from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.families.adapted import TAIL, with_bearing, with_yielding
+from pam_envs.diagnosis.families.adapted import with_bearing, with_yielding
 from pam_envs.diagnosis.families.antagonistic_joint import (
     LEAST_BREAK,
     PAIRS,
@@ -144,7 +144,7 @@ class ElbowKind(RegulatedKind):
     renamed = ({"position": "angle", "mass": "link"},)
     factors = FACTORS
     titles = TITLES
-    catalogue = with_yielding(with_bearing("link", BREAKS), (TAIL,), "hysteresis")
+    catalogue = with_yielding(with_bearing("link", BREAKS), "hysteresis")
 
     def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundElbow:
         """Return an orthosis with the inputs of a recording; ValueError with on/off valves."""

@@ -359,6 +359,7 @@ def finer_terms_on(fixed: Any) -> int:
         + count_on(fixed[R.MUSCLE_LOAD_STIFFENING_2], 0.0)
         + count_on(fixed[R.MUSCLE_LOAD_STIFFENING_ROOT], 0.0)
         + count_on(fixed[R.MUSCLE_VISCOSITY], 0.0)
+        + count_on(fixed[R.MUSCLE_VISCOSITY_PER_PRESSURE], 0.0)
         + count_on(fixed[R.MASS_LOAD_ERROR], 0.0)
         + count_on(fixed[R.MASS_SLACK], 0.0)
     )
@@ -406,7 +407,12 @@ def finer_pull(
     hangs = load_fraction(x, rows[EFFECTS_AT + S.hangs][j], slack)
     eased = weight * length / max(slack, 1e-6)
     loss = fixed[R.MASS_DAMPING][j] + viscous_damping(
-        fixed[R.MUSCLE_VISCOSITY][j], rows[R.VELOCITY][j], fixed[R.MUSCLE_VISCOSITY_SPEED][j]
+        fixed[R.MUSCLE_VISCOSITY][j],
+        fixed[R.MUSCLE_VISCOSITY_SPEED][j],
+        fixed[R.MUSCLE_VISCOSITY_PER_PRESSURE][j],
+        fixed[R.MUSCLE_VISCOSITY_RELAXING][j],
+        rows[R.VELOCITY][j],
+        middle,
     )
     taper = fixed[R.MUSCLE_AREA_TAPER][j] + fixed[R.MUSCLE_AREA_CURVE][j] * e
     area = fixed[R.MUSCLE_AREA][j] * (1.0 - taper * e)
@@ -616,6 +622,7 @@ def advance_extended(
     deflects = count_on(fixed[R.MUSCLE_YIELD_FORCE], 0.0)
     maps = map_on(fixed, R.MUSCLE_MAP_05)
     fine = sticks + count_on(fixed[R.MUSCLE_VISCOSITY], 0.0)
+    fine = fine + count_on(fixed[R.MUSCLE_VISCOSITY_RELAXING], 1.0)
     parts, finer = FINE_PARTS if fine > 0 else 1, finer_terms_on(fixed)
     for j in range(LANES):
         if load[j] != rows[EFFECTS_AT + S.hung][j]:

@@ -46,7 +46,7 @@ class Hysteresis(
         ("shape",),
         ("pressure_slope",),
         ("pressure_bend",),
-        ("yield_width", "yield_break", "yield_ratio"),
+        ("yield_width", "yield_break", "yield_ratio", "yield_tail"),
         ("first_width", "first_loss", "first_travel"),
         ("threshold",),
         ("friction", "limit_per_pressure", "limit_per_load"),

@@ -19,7 +19,7 @@ from pam_envs.mechanics.guide import GuideEffects
 from pam_envs.mechanics.hanging_mass import MOUNT_STATE, MountEffects, SupportEffects
 from pam_envs.muscle.effects import (
     LengthCreepEffects,
-    LengthYieldEffects,
+    LengthYieldTailEffects,
     LoadEffects,
     StaticMapEffects,
     StrandEffects,
@@ -45,7 +45,7 @@ _EFFECTS: dict[str, tuple[Any, ...]] = {
     "muscle": (
         *("area_curve", "softening", "stiffening"),
         *(TemperatureEffects, LoadEffects, LengthCreepEffects, StrandEffects, ViscosityEffects),
-        *(StaticMapEffects, LengthYieldEffects),
+        *(StaticMapEffects, LengthYieldTailEffects),
     ),
     "mass": ("carried", "load_error", SupportEffects, GuideEffects, MountEffects),
     "position": SENSOR._fields,

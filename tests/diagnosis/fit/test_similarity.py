@@ -17,6 +17,7 @@ EFFECTS = {
     "muscle.strand_per_pressure": 2e-6,
     "muscle.yield_force": 0.3,
     "muscle.viscosity": 2.0,
+    "muscle.viscosity_per_pressure": 1e-5,
     "muscle.load_stiffening": 1e-3,
     "hysteresis.stretch": 0.2,
     "hysteresis.threshold": 1e3,

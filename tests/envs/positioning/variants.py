@@ -37,6 +37,8 @@ EVERY_EFFECT = {
     "muscle.strand_2": 3.0,
     "muscle.strand_4": 2.0,
     "muscle.viscosity": 200.0,
+    "muscle.viscosity_per_pressure": 1e-3,
+    "muscle.viscosity_relaxing": 0.5,
     "mass.load_error": 0.1,
     "mass.slack": 1e-3,
     "mass.stick": 3.0,
