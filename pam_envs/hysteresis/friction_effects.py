@@ -123,6 +123,15 @@ def yield_step(
 
 
 @dataclass(frozen=True, kw_only=True)
+class StartEffects:
+    """Friction at the start of a rollout or replay, which nothing has moved before by default."""
+
+    start: float = effect(
+        "1", -1.0, 1.0, "friction at the start over its largest; below 0: after relaxation"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class FirstCycles:
     """Loss of force in the first cycles."""
 

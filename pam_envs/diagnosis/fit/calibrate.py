@@ -37,7 +37,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-from pam_envs.pneumatics.flow import REPLACED
+from pam_envs.pneumatics.flow import AIRS, REPLACED, SWITCH
 
 FAST = 0.04  # lag [s] below which the replay takes finer steps
 FINE_STEP = 0.0101
@@ -310,7 +310,7 @@ def orifices_of(plant: SingleMuscle) -> SingleMuscle:
     """Return a plant with flow through orifices at their starting values, without a pilot."""
     source = max(ORIFICES["regulator.source_pressure"], 1.2 * plant.regulator.max_pressure)
     values = {**ORIFICES, "regulator.source_pressure": source, "regulator.pilot_lag": 0.0}
-    return plant.replace(values).with_air("flow")
+    return plant.replace_with_substeps({**values, SWITCH: float(AIRS.index("flow"))})
 
 
 def start_at_guess(frees: tuple[Free, ...], found: dict[str, float]) -> tuple[Free, ...]:

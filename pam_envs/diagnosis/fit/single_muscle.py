@@ -36,6 +36,8 @@ LEVELS, MARGIN, REACH = (6, 10), 1.05, 1.1
 """Levels of pressure and strain by which recorded states are grouped for these checks, range of the
 map over that of the groups, and range of the checks without pressure over the recorded one."""
 YIELD = "muscle.yield_force"
+START = "hysteresis.start"
+"""Friction when the recording starts: of the recording, not of the plant."""
 SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.gain": {"scale": 0.01},
     "regulator.time_constant": {"log": True, "prior": 1.5},
@@ -50,6 +52,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "muscle.stiffening": {"scale": 1e4, "prior": 60.0},
     "mass.moving_mass": {"log": True, "prior": 0.7},
     "mass.damping": {"log": True, "prior": 1.0},
+    START: {"scale": 0.2, "prior": 5.0},
     "regulator.conductance": {"log": True, "prior": 3.0},
     "regulator.exhaust_share": {"log": True, "prior": 1.5},
     "regulator.critical_ratio": {"scale": 0.1, "prior": 3.0},
@@ -245,6 +248,7 @@ class MuscleFamily:
     def plant_of(self, column: Array) -> SingleMuscle:
         """Return the plant with the parameters of a column."""
         values: dict[str, Any] = {n: float(column[R.place(n)]) for n in R.NAMES}
+        values[START] = self.plant.value(START)
         if not any(values[f"muscle.{name}"] for name in MAP_SIZES):
             values |= UNUSED_MAP
         n = self.plant.elements

@@ -31,9 +31,12 @@ from pam_envs.mechanics.guide import stick_slip_step
 from pam_envs.mechanics.hanging_mass import MOUNT_STATE, load_fraction, mount_step
 from pam_envs.muscle.effective_area import law_and_slope, tension, tension_slope, volume
 from pam_envs.muscle.effects import (
+    BREAKS,
+    STRANDS,
     map_force,
     map_on,
     map_slopes,
+    slip_limit,
     slip_strands,
     stiffening,
     strand_forces,
@@ -42,6 +45,7 @@ from pam_envs.muscle.effects import (
     viscous_damping,
     yield_deflections,
     yield_forces,
+    yield_spring,
 )
 from pam_envs.plants.core.sensors import begin_with_effects, effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
@@ -313,6 +317,45 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     position = x * (1.0 + crept) - rows[R.REST][j]
     rows[EFFECTS_AT + S.position][j] = position
     begin_with_effects(rows, fixed, j)
+
+
+@kernel
+def begin_plays(rows: Any, fixed: Any, state: int, elements: int, j: int) -> None:
+    """Begin the friction of the pressure of lane ``j`` at no pressure, with the share at the start.
+
+    ``state`` is the first row of the plays.
+    """
+    share = fixed[R.HYSTERESIS_START][j]
+    rows[EFFECTS_AT + S.yielding][j] = share
+    for k in range(elements if STAGED > 0 else 0):
+        rows[state + k][j] = -share * fixed[R.THRESHOLD + k][j]
+
+
+@kernel
+def begin_friction_of_length(rows: Any, fixed: Any, j: int) -> None:
+    """Put lane ``j`` at rest with the share of its strands' and yielding friction at the start."""
+    share, drive = fixed[R.HYSTERESIS_START][j], rows[R.DRIVE][j]
+    wide = friction_per_load(fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j])
+    strands = slip_limit(fixed, j, R.MUSCLE_STRAND_BREAK + 1, drive)
+    stiff, limit = yield_spring(fixed, j, R.MUSCLE_YIELD_FORCE, drive)
+    most = stiff * limit
+    for k in range(STRANDS):
+        most = most + fixed[R.MUSCLE_STRAND_1 + k][j] * strands
+    length = fixed[R.MUSCLE_REST_LENGTH][j]
+    low, high = -0.3, 0.6
+    for _ in range(56 if share != 0.0 else 0):
+        e = 0.5 * (low + high)
+        if excess_pull(rows, fixed, j, e) > share * most * wide:
+            low = e
+        else:
+            high = e
+    if share != 0.0:
+        rows[R.CONTRACTION][j] = 0.5 * (low + high) * length
+    begin_effects(rows, fixed, j)
+    rows[EFFECTS_AT + S.deflection][j] = share * limit
+    for k in range(STRANDS):
+        span = BREAKS[k] * fixed[R.MUSCLE_STRAND_BREAK][j] * strands
+        rows[EFFECTS_AT + S.strands + k][j] = rows[R.CONTRACTION][j] / length - share * span
 
 
 @kernel

@@ -10,6 +10,7 @@ from pam_envs.hysteresis.friction_effects import (
     CreepEffects,
     FirstCycles,
     FrictionEffects,
+    StartEffects,
     Threshold,
     YieldEffects,
 )
@@ -24,7 +25,13 @@ _FIT = "least squares on positioning2021, Tables 3-5"
 
 @dataclass(frozen=True)
 class Hysteresis(
-    Threshold, FirstCycles, CreepEffects, YieldEffects, FrictionEffects, OperatorComponent
+    StartEffects,
+    Threshold,
+    FirstCycles,
+    CreepEffects,
+    YieldEffects,
+    FrictionEffects,
+    OperatorComponent,
 ):
     """Friction of braid and tube, driven by length or by pressure.
 
@@ -49,6 +56,7 @@ class Hysteresis(
         ("yield_width", "yield_break", "yield_ratio", "yield_tail"),
         ("first_width", "first_loss", "first_travel"),
         ("threshold",),
+        ("start",),
         ("friction", "limit_per_pressure", "limit_per_load"),
     )
 

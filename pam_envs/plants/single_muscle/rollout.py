@@ -15,7 +15,8 @@ from pam_envs.plants.core.rollout import Loop, drives_of, first_of, loop_for, pl
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import (
     EFFECTS_AT,
-    begin_effects,
+    begin_friction_of_length,
+    begin_plays,
     replacements,
     rest_extended,
     settled,
@@ -82,13 +83,14 @@ def begin_extended(
         counts[R.STACK_COUNT][j] = 1
         rows[R.REST][j] = rest_extended(fixed, j, 0.0, rows[R.LOAD][j])
         begin_rest(rows, fixed, counts, table, R.END, elements, j)
+        begin_plays(rows, fixed, R.END, elements, j)
     settled(rows, fixed, counts, table, R.END, 0, LANES, elements, work)
     for j in range(LANES):
         rows[R.PRESSURE][j] = drives[START_PRESSURE][t][min(first + j, last)]
     settled(rows, fixed, counts, table, R.END, 0, LANES, elements, work)
     for j in range(LANES):
         slide_to_rest(rows, fixed, counts, table, R.END, elements, j)
-        begin_effects(rows, fixed, j)
+        begin_friction_of_length(rows, fixed, j)
         fill_ring(rows, R.HISTORY, j, drives[HELD][t][min(first + j, last)])
 
 

@@ -11,6 +11,7 @@ from pam_envs.hysteresis.friction_effects import (
     CreepEffects,
     FirstCycles,
     FrictionEffects,
+    StartEffects,
     Threshold,
     YieldEffects,
 )
@@ -41,6 +42,7 @@ _EFFECTS: dict[str, tuple[Any, ...]] = {
         FirstCycles,
         Threshold,
         YieldEffects,
+        StartEffects,
     ),
     "muscle": (
         *("area_curve", "softening", "stiffening"),
