@@ -97,6 +97,14 @@ FINE_PARTS = 4
 
 
 @kernel
+def friction_factor(rows: Any, fixed: Any, j: int) -> float:
+    """Return the factor on the friction of strands and that yields: of load and first travel."""
+    new = newness(rows[EFFECTS_AT + S.travel][j], fixed[R.HYSTERESIS_FIRST_TRAVEL][j])
+    wide = friction_per_load(fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j])
+    return (1.0 + fixed[R.HYSTERESIS_FIRST_WIDTH][j] * new) * wide  # type: ignore[no-any-return]
+
+
+@kernel
 def yield_to_pressure(rows: Any, fixed: Any, first: int, last: int, own: Any) -> None:
     """Move the yielding friction of the pressure to the pressure reached."""
     above = own[0]
@@ -146,9 +154,7 @@ def effective_pressure(
         )
         drive[j] = true[j] - (1.0 + fixed[R.HYSTERESIS_FIRST_WIDTH][j] * new) * friction[j]
     for j in range(first, last if yields > 0 else first):
-        width = fixed[R.HYSTERESIS_YIELD_WIDTH][j] * friction_per_load(
-            fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j]
-        )
+        width = fixed[R.HYSTERESIS_YIELD_WIDTH][j] * friction_factor(rows, fixed, j)
         drive[j] = drive[j] - width * rows[EFFECTS_AT + S.yielding][j]
     if creeps > 0:
         for j in range(first, last):
@@ -277,11 +283,19 @@ def rest_extended(fixed: Any, lane: int, drive: float, load: float) -> float:
 
 
 @kernel
+def first_stiffening(rows: Any, fixed: Any, j: int) -> float:
+    """Return the passive force over strain [N] that lane ``j`` has in its first travel alone."""
+    new = newness(rows[EFFECTS_AT + S.travel][j], fixed[R.HYSTERESIS_FIRST_TRAVEL][j])
+    return fixed[R.HYSTERESIS_FIRST_STIFFNESS][j] * new  # type: ignore[no-any-return]
+
+
+@kernel
 def excess_pull(rows: Any, fixed: Any, j: int, e: float) -> float:
     """Return the force [N] of one lane at a strain beyond what hangs of the load."""
     x, drive = e * fixed[R.MUSCLE_REST_LENGTH][j], rows[R.DRIVE][j]
     _, weight, stiffer, shift = carried(fixed, j, rows[R.LOAD][j])
     pull = pull_at_rest(fixed, j, drive - shift, e, stiffer)
+    pull = pull - first_stiffening(rows, fixed, j) * e
     hangs = load_fraction(x, rows[EFFECTS_AT + S.hangs][j], fixed[R.MASS_SLACK][j])
     return pull - weight * hangs
 
@@ -335,7 +349,7 @@ def begin_plays(rows: Any, fixed: Any, state: int, elements: int, j: int) -> Non
 def begin_friction_of_length(rows: Any, fixed: Any, j: int) -> None:
     """Put lane ``j`` at rest with the share of its strands' and yielding friction at the start."""
     share, drive = fixed[R.HYSTERESIS_START][j], rows[R.DRIVE][j]
-    wide = friction_per_load(fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j])
+    wide = friction_factor(rows, fixed, j)
     strands = slip_limit(fixed, j, R.MUSCLE_STRAND_BREAK + 1, drive)
     stiff, limit = yield_spring(fixed, j, R.MUSCLE_YIELD_FORCE, drive)
     most = stiff * limit
@@ -401,6 +415,7 @@ def finer_terms_on(fixed: Any) -> int:
         + count_on(fixed[R.MUSCLE_LOAD_STIFFENING], 0.0)
         + count_on(fixed[R.MUSCLE_LOAD_STIFFENING_2], 0.0)
         + count_on(fixed[R.MUSCLE_LOAD_STIFFENING_ROOT], 0.0)
+        + count_on(fixed[R.HYSTERESIS_FIRST_STIFFNESS], 0.0)
         + count_on(fixed[R.MUSCLE_VISCOSITY], 0.0)
         + count_on(fixed[R.MUSCLE_VISCOSITY_PER_PRESSURE], 0.0)
         + count_on(fixed[R.MASS_LOAD_ERROR], 0.0)
@@ -446,6 +461,8 @@ def finer_pull(
     e = x * (1.0 / length)
     middle = 0.5 * (was + rows[R.DRIVE][j]) - shift
     pull, slope = law_of(fixed, j, was - shift, middle, e, stiffer)
+    first = first_stiffening(rows, fixed, j)
+    pull, slope = pull - first * e, slope + first
     slack = fixed[R.MASS_SLACK][j]
     hangs = load_fraction(x, rows[EFFECTS_AT + S.hangs][j], slack)
     eased = weight * length / max(slack, 1e-6)
@@ -507,7 +524,7 @@ def forces(
         )  # fmt: skip
     if strands + deflects > 0:
         for j in range(LANES):
-            wide = friction_per_load(fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j])
+            wide = friction_factor(rows, fixed, j)
             friction[j] = friction[j] * wide
             sticking[j] = sticking[j] * wide
     if maps > 0:

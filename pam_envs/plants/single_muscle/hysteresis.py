@@ -54,7 +54,7 @@ class Hysteresis(
         ("pressure_slope",),
         ("pressure_bend",),
         ("yield_width", "yield_break", "yield_ratio", "yield_tail"),
-        ("first_width", "first_loss", "first_travel"),
+        ("first_width", "first_loss", "first_stiffness", "first_travel"),
         ("threshold",),
         ("start",),
         ("friction", "limit_per_pressure", "limit_per_load"),
@@ -85,8 +85,9 @@ class Hysteresis(
     limit_per_load: float = identified(
         0.0, "1/kg", -0.2, 1.0, f"slip force over that without load; {_FIT}", neutral=0.0
     )
-    # an effect of the first cycles that only this hysteresis has
+    # effects of the first cycles that only this hysteresis has
     first_width: float = effect("1", -1.0, 10.0, "extra loop width of the first travel")
+    first_stiffness: float = effect("N", 0.0, 1e6, "passive force over strain of the first travel")
 
     pressure_only: ClassVar[dict[str, str]] = {
         "stretch": "limit_per_pressure",

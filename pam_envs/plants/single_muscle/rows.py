@@ -38,7 +38,7 @@ _EFFECTS: dict[str, tuple[Any, ...]] = {
     "hysteresis": (
         FrictionEffects,
         CreepEffects,
-        "first_width",
+        *("first_width", "first_stiffness"),
         FirstCycles,
         Threshold,
         YieldEffects,

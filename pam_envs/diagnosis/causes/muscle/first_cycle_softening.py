@@ -2,7 +2,7 @@
 
 Filled rubber loses part of its stiffness at the first stretch (Mullins effect) and recovers it in a
 long rest; strands that adhere to one another come loose. The first travel of the pressure therefore
-has wider loops and less effective pressure, and both decay with the travel.
+has more passive force or less effective pressure, and wider loops, which decay with the travel.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
@@ -11,6 +11,14 @@ CAUSE = Cause(
     name="first_cycle_softening",
     title="softening over the first cycles",
     forms=(
+        Form(
+            "stiffness",
+            (
+                Term("hysteresis.first_stiffness", (50.0,), scale=50.0),
+                Term("hysteresis.first_width", (0.1,), scale=0.1),
+                Term("hysteresis.first_travel", (1e6, 6e6), log=True, amount=False),
+            ),
+        ),
         Form(
             "width and loss",
             (
