@@ -21,9 +21,9 @@ SLIDE = 0.2
 class SensorEffects:
     """Effects of any sensor, neutral unless a recording shows them.
 
-    A reading is ``x + bow x (x / full - 1) + drift + ramp + slip`` of the quantity ``x`` that the
-    sensor measured ``delay`` seconds ago. ``quantity`` is its unit and the largest drift, ramp and
-    slip.
+    A reading is ``x + (bow + wave (2 u - 1)) x (u - 1) + drift + ramp + slip``, ``u = x / full``,
+    of the quantity ``x`` that the sensor measured ``delay`` seconds ago. ``quantity`` is its unit
+    and the largest drift, ramp and slip.
     """
 
     quantity: ClassVar[tuple[str, float]] = ("1", 1.0)
@@ -32,6 +32,7 @@ class SensorEffects:
         ("ramp", "ramp_at", "ramp_over"),
         ("delay",),
         ("bow",),
+        ("wave",),
         ("slip", "slip_at"),
     )
 
@@ -42,6 +43,7 @@ class SensorEffects:
     ramp_over: float = assumed(60.0, "s", 1.0, 1e6, "its duration")
     delay: float = effect("s", 0.0, 0.14, "of the reading")
     bow: float = effect("1", -0.5, 0.5, "parabola over full scale")
+    wave: float = effect("1", -0.5, 0.5, "S-shaped deviation over full scale")
     slip: float = effect("{}", -1.0, 1.0, "step of a clamp")
     slip_at: float = assumed(0.0, "s", 0.0, 1e6, "time of the slip")
 
@@ -150,9 +152,10 @@ SENSOR = parameter_rows(SensorEffects)
 
 
 @kernel
-def bowed(x: float, bow: float, full: float) -> float:
-    """Return the reading of a quantity on a bowed scale, exact at 0 and at full scale."""
-    return x + bow * x * (x / full - 1.0)
+def bowed(x: float, bow: float, wave: float, full: float) -> float:
+    """Return the reading of a quantity on a curved scale, exact at 0 and at full scale."""
+    u = x / full
+    return x + (bow + wave * (2.0 * u - 1.0)) * x * (u - 1.0)
 
 
 @kernel
@@ -208,9 +211,11 @@ def sense(
     if count_on(fixed[effects + SENSOR.delay], 0.0) > 0:
         for j in range(LANES):
             shown[j] = delayed_reading(rows, fixed, j, ring, effects, step[j] + 1, period)
-    if count_on(fixed[effects + SENSOR.bow], 0.0) > 0:
+    bows = count_on(fixed[effects + SENSOR.bow], 0.0)
+    if bows + count_on(fixed[effects + SENSOR.wave], 0.0) > 0:
         for j in range(LANES):
-            shown[j] = bowed(shown[j], fixed[effects + SENSOR.bow][j], full[j])
+            bow, wave = fixed[effects + SENSOR.bow][j], fixed[effects + SENSOR.wave][j]
+            shown[j] = bowed(shown[j], bow, wave, full[j])
     if count_on(fixed[effects + SENSOR.drift], 0.0) > 0:
         for j in range(LANES):
             shown[j] = shown[j] + drift_of(
@@ -234,4 +239,5 @@ def begin_sensor(
     """Begin the sensor of one lane at a quantity that has been constant (see :func:`sense`)."""
     fill_ring(rows, ring, j, value)
     ramp, slip = ramp_and_slip(fixed, j, effects, 0.0)
-    rows[reading][j] = bowed(value, fixed[effects + SENSOR.bow][j], full) + ramp + slip
+    bow, wave = fixed[effects + SENSOR.bow][j], fixed[effects + SENSOR.wave][j]
+    rows[reading][j] = bowed(value, bow, wave, full) + ramp + slip

@@ -1,8 +1,8 @@
 """Sensor nonlinearity: the reading deviates between the ends of its range.
 
 Potentiometers, draw-wire sensors and bridges follow their calibration line at the ends and deviate
-between them. The error is a parabola that vanishes at zero and at full scale. It is not separable
-from a static law of the same curvature, unless that law acts at several loads.
+between them. The error is a parabola and an S that vanish at zero and at full scale. It is not
+separable from a static law of the same curvature, unless that law acts at several loads.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
@@ -11,8 +11,16 @@ CAUSE = Cause(
     name="sensor_nonlinearity",
     title="the nonlinearity of a sensor",
     forms=(
-        Form("position", (Term("position.bow", (0.01, -0.01), scale=0.01),)),
-        Form("pressure", (Term("pressure.bow", (0.01, -0.01), scale=0.01),)),
+        *(
+            Form(
+                sensor,
+                (
+                    Term(f"{sensor}.bow", (0.01, -0.01), scale=0.01),
+                    Term(f"{sensor}.wave", (0.01,), scale=0.01),
+                ),
+            )
+            for sensor in ("position", "pressure")
+        ),
     ),
     signature="a smooth function of the reading alone, whatever load, direction, rate and time",
     neighbours=("sensor_bias", "sensor_drift", "static_law"),
