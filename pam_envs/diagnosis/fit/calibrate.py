@@ -26,6 +26,7 @@ from pam_envs.diagnosis.fit.least_squares import (
     promising,
 )
 from pam_envs.diagnosis.fit.single_muscle import (
+    BORE,
     CLOCK,
     LAG,
     ORIFICES,
@@ -39,7 +40,7 @@ from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.flow import AIRS, REPLACED, SWITCH
 
-FAST = 0.04  # lag [s] below which the replay takes finer steps
+FAST = 0.04  # lag [s] below which the replay takes finer steps, as with orifices
 FINE_STEP = 0.0101
 RACE, GUESS_ROUNDS, FLOW_ROUNDS, ROUNDS = 2, 6, 12, 10
 """Rounds after which only fits near the best one continue, and rounds of each stage."""
@@ -207,7 +208,7 @@ def regulator(
 def regulator_of(family: MuscleFamily) -> tuple[Free, ...]:
     """Return the free parameters of the regulator and the clock."""
     every = family.base()
-    return tuple(f for f in every if f.name.startswith("regulator.") or f.name == CLOCK)
+    return tuple(f for f in every if f.name.startswith("regulator.") or f.name in (BORE, CLOCK))
 
 
 def of_pressure(problem: Problem) -> Problem:
@@ -263,7 +264,7 @@ def orifices(
 
     The muscle, whose volume is filled, is that of the family or one with the parameters ``law``.
     """
-    other = dataclasses.replace(family, plant=orifices_of(family.plant))
+    other = dataclasses.replace(family, plant=orifices_of(family.plant)).finer(FINE_STEP)
     full = family.plant.regulator.max_pressure
     columns = [other.column, column_with(other, law)] if law else [other.column]
     fits = []

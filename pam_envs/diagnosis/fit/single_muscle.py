@@ -36,6 +36,8 @@ LEVELS, MARGIN, REACH = (6, 10), 1.05, 1.1
 """Levels of pressure and strain by which recorded states are grouped for these checks, range of the
 map over that of the groups, and range of the checks without pressure over the recorded one."""
 YIELD = "muscle.yield_force"
+BORE = "muscle.diameter"
+"""Size of the enclosed volume at rest; the force law gives how it grows."""
 START = "hysteresis.start"
 """Friction when the recording starts: of the recording, not of the plant."""
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -52,6 +54,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "muscle.stiffening": {"scale": 1e4, "prior": 60.0},
     "mass.moving_mass": {"log": True, "prior": 0.7},
     "mass.damping": {"log": True, "prior": 1.0},
+    BORE: {"log": True, "prior": 1.0},
     START: {"scale": 0.2, "prior": 5.0},
     "regulator.conductance": {"log": True, "prior": 3.0},
     "regulator.exhaust_share": {"log": True, "prior": 1.5},
@@ -89,7 +92,7 @@ SOURCE, LEAST_SOURCE = "regulator.source_pressure", 1.001
 LAG = "regulator.time_constant"
 PILOT = {"regulator.pilot_lag": 0.02, "regulator.pilot_damping": 1.0}
 """Starting values of the pilot stage of a regulator of second order."""
-BASE = tuple(name for name in SETTINGS if name not in PILOT and name not in ORIFICES)
+BASE = tuple(name for name in SETTINGS if name not in {*PILOT, *ORIFICES, BORE})
 CLOCK = "clock.offset"
 """Time [s] by which the readings lag the command: no parameter of the plant."""
 USUAL_ROWS = 2.5
@@ -235,7 +238,7 @@ class MuscleFamily:
         """Return the base parameters, with those of effects that the plant already has."""
         flows = self.plant.air == "flow"
         names = [name for name in BASE if not (flows and name == LAG)]
-        names += [*(ORIFICES if flows else ()), *((CLOCK,) if self.clock > 0.0 else ())]
+        names += [*((*ORIFICES, BORE) if flows else ()), *((CLOCK,) if self.clock > 0.0 else ())]
         names += [name for name in PILOT if self.plant.regulator.pilot_lag > 0.0]
         names += [f"hysteresis.weight[{k}]" for k in range(self.plant.elements)]
         present = [
