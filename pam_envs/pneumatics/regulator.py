@@ -375,7 +375,7 @@ def pilot_step(
     rows: Any, fixed: Any, j: int, state: int, effects: int, target: float, pressure: float,
     h: float,
 ) -> float:  # fmt: skip
-    """Return the setpoint [Pa] behind the pilot stage of lane ``j`` after ``h`` seconds.
+    """Return the mean setpoint [Pa] behind the pilot stage of lane ``j`` over ``h`` seconds.
 
     A second-order lag; the setpoint itself without a pilot. While the valve is shut (a target below
     zero) the pilot follows the ``pressure``.
@@ -389,8 +389,9 @@ def pilot_step(
         return target
     turns = 1.0 / (TURN * max(lag, SHORTEST_PILOT * h, 1e-9))
     ratio = fixed[effects + AIR.pilot_damping][j]
+    before = rows[state + AIR_STATE.pilot][j]
     behind, _ = resonator_step(rows, j, state + AIR_STATE.pilot, target, target, turns, ratio, h)
-    return max(0.0, behind)
+    return max(0.0, 0.5 * (before + behind))
 
 
 @kernel

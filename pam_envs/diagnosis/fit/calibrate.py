@@ -41,7 +41,8 @@ from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.flow import AIRS, REPLACED, SWITCH
 
 FAST = 0.04  # lag [s] below which the replay takes finer steps, as with orifices
-FINE_STEP = 0.0101
+FINE_STEP, FINEST_STEP = 0.0101, 0.0051
+"""Longest steps [s] of a replay with a fast regulator of first and of second order."""
 RACE, GUESS_ROUNDS, FLOW_ROUNDS, ROUNDS = 2, 6, 12, 10
 """Rounds after which only fits near the best one continue, and rounds of each stage."""
 DAMPING = "mass.damping"
@@ -111,7 +112,7 @@ def calibrate(
         found |= fit.values()
         rate = next((r for r in rates if all(t.name in found for t in r.terms)), None)
         if family.plant.air == "regulator" and found[LAG] < FAST:
-            family = family.finer(FINE_STEP)
+            family = family.finer(FINEST_STEP if set(PILOT) <= set(found) else FINE_STEP)
         problem = replayed_by(family, problem)
         column = column_of(fit, fit.z)
     frees = family.base()
