@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
 from pam_envs.kernels.motion import resonator_step
 from pam_envs.mechanics.guide import GuideEffects
@@ -11,9 +12,18 @@ from pam_envs.parameters import assumed, effect, named_rows, published
 
 @dataclass(frozen=True, kw_only=True)
 class SupportEffects:
-    """Support that gives way under the load."""
+    """Support that gives way under the load, or a slack wire."""
 
     slack: float = effect("m", 0.0, 0.02, "contraction over which the support lets the load go")
+    slack_free: float = assumed(0.0, "1", 0.0, 0.95, "share of it without any load", neutral=0.0)
+    slack_sag: float = assumed(
+        0.0,
+        "1",
+        0.0,
+        1.0,
+        "from a straight rise of the load to a sagging wire's",
+        neutral=0.0,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +47,7 @@ class HangingMass(MountEffects, SupportEffects, GuideEffects):
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
         ("carried",),
         ("load_error",),
-        ("slack",),
+        ("slack", "slack_free", "slack_sag"),
         ("stick", "stick_kinetic", "stick_speed"),
         ("ring_share", "ring_frequency", "ring_damping"),
     )
@@ -59,13 +69,24 @@ MOUNT_STATE = named_rows("position", "rate")
 
 
 @kernel
-def load_fraction(x: float, hangs: float, slack: float) -> float:
-    """Return the share of a load that hangs on the muscle, 0 to 1.
+def load_fraction(
+    x: float, hangs: float, slack: float, free: float, sag: float
+) -> tuple[float, float]:
+    """Return the share of a load that hangs on the muscle, 0 to 1, and its slope [1/m].
 
     From the position ``hangs`` of the unpressurised muscle [m] on, the muscle takes the load over
-    from the support within ``slack`` [m].
+    from the support within ``slack`` [m]: in a straight line after the share ``free`` of it, or as
+    an exponential function for the share ``sag`` of the load.
     """
-    return 1.0 if slack <= 0.0 else max(0.0, min(1.0, (x - hangs) / slack))
+    if slack <= 0.0:
+        return 1.0, 0.0
+    u, width = max(0.0, (x - hangs) / slack), 1.0 - free
+    straight = max(0.0, min(1.0, (u - free) / width))
+    rising = 1.0 / width if 0.0 < straight < 1.0 else 0.0
+    left = decay(min(40.0, u))
+    bent = left if u > 0.0 else 0.0
+    share = straight + sag * (1.0 - left - straight)
+    return share, (rising + sag * (bent - rising)) / slack
 
 
 @kernel

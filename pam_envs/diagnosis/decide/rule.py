@@ -14,12 +14,13 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "10"  # part of every report
+    version: str = "11"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
-    # the same on a rig whose law or friction differs from the base: a smaller gain may correct what
-    # is left of that difference
-    differing_gain: float = 0.3
+    # the same on a rig whose law or friction differs from the base, of any cause and of one that is
+    # like another law: a smaller gain may correct what is left of that difference
+    differing_gain: float = 0.2
+    differing_lawlike: float = 0.3
     trial_penalty: float = (
         0.01  # multiple-comparison penalty: gain lost for each factor e of trials
     )
@@ -87,9 +88,12 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
     """Return the verdict on evidence (``pam_envs.diagnosis.decide.verdict.Ladder.evidence``)."""
     levels = evidence["levels"]
     least = max(rule.least_gain, rule.least_total / max(1, evidence["blocks"]))
+    first_least = least
     if evidence.get("differs", False):
+        lawlike = len(levels) > 1 and levels[1].get("lawlike", False)
         least = max(least, rule.differing_gain)
-    if len(levels) < 2 or not is_accepted(levels[1], least, rule):
+        first_least = max(least, rule.differing_lawlike if lawlike else 0.0)
+    if len(levels) < 2 or not is_accepted(levels[1], first_least, rule):
         if has_structure(levels[0]["left"], rule):
             return unexplained(evidence, 0, rule)
         return Judgement("adequate", 0)

@@ -259,6 +259,18 @@ def pull_at_rest(fixed: Any, j: int, drive: float, e: float, stiffer: float) -> 
     return pull + map_force(fixed, j, R.MUSCLE_MAP_05, drive, e)
 
 
+@kernel
+def hanging_share(fixed: Any, j: int, x: float, hangs: float) -> tuple[float, float]:
+    """Return the share of a load that hangs on the muscle at a contraction [m], and its slope."""
+    return load_fraction(  # type: ignore[no-any-return]
+        x,
+        hangs,
+        fixed[R.MASS_SLACK][j],
+        fixed[R.MASS_SLACK_FREE][j],
+        fixed[R.MASS_SLACK_SAG][j],
+    )
+
+
 @routine
 def balance(fixed: Any, lane: int, drive: float, load: float, hangs: float) -> float:
     """Return the position [m] at rest of one lane, by bisection."""
@@ -268,7 +280,7 @@ def balance(fixed: Any, lane: int, drive: float, load: float, hangs: float) -> f
     for _ in range(56):
         e = 0.5 * (low + high)
         pull = pull_at_rest(fixed, lane, drive - shift, e, stiffer)
-        if pull > weight * load_fraction(e * length, hangs, fixed[R.MASS_SLACK][lane]):
+        if pull > weight * hanging_share(fixed, lane, e * length, hangs)[0]:
             low = e
         else:
             high = e
@@ -296,7 +308,7 @@ def excess_pull(rows: Any, fixed: Any, j: int, e: float) -> float:
     _, weight, stiffer, shift = carried(fixed, j, rows[R.LOAD][j])
     pull = pull_at_rest(fixed, j, drive - shift, e, stiffer)
     pull = pull - first_stiffening(rows, fixed, j) * e
-    hangs = load_fraction(x, rows[EFFECTS_AT + S.hangs][j], fixed[R.MASS_SLACK][j])
+    hangs, _ = hanging_share(fixed, j, x, rows[EFFECTS_AT + S.hangs][j])
     return pull - weight * hangs
 
 
@@ -463,9 +475,8 @@ def finer_pull(
     pull, slope = law_of(fixed, j, was - shift, middle, e, stiffer)
     first = first_stiffening(rows, fixed, j)
     pull, slope = pull - first * e, slope + first
-    slack = fixed[R.MASS_SLACK][j]
-    hangs = load_fraction(x, rows[EFFECTS_AT + S.hangs][j], slack)
-    eased = weight * length / max(slack, 1e-6)
+    hangs, rising = hanging_share(fixed, j, x, rows[EFFECTS_AT + S.hangs][j])
+    eased = weight * length * rising
     loss = fixed[R.MASS_DAMPING][j] + viscous_damping(
         fixed[R.MUSCLE_VISCOSITY][j],
         fixed[R.MUSCLE_VISCOSITY_SPEED][j],
@@ -476,7 +487,7 @@ def finer_pull(
     )
     taper = fixed[R.MUSCLE_AREA_TAPER][j] + fixed[R.MUSCLE_AREA_CURVE][j] * e
     area = fixed[R.MUSCLE_AREA][j] * (1.0 - taper * e)
-    return pull, slope, mass, weight * hangs, eased if 0.0 < hangs < 1.0 else 0.0, loss, area
+    return pull, slope, mass, weight * hangs, eased, loss, area
 
 
 @kernel

@@ -1,7 +1,8 @@
 """Slack wire: the load rests on its support until the wire is tight.
 
 With a load on a support or a sagging wire the muscle first contracts as if unloaded. It lifts the
-load only after some contraction, and from there the curve is that of the load.
+load only after some contraction, at once or as the wire straightens, and from there the curve is
+that of the load.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
@@ -10,7 +11,20 @@ CAUSE = Cause(
     name="wire_slack",
     title="the slack of the wire",
     forms=(
-        Form("unilateral", (Term("mass.slack", (2e-4, 5e-4, 1.2e-3, 3e-3, 6e-3), scale=1e-4),)),
+        Form(
+            "unilateral",
+            (
+                Term("mass.slack", (2e-4, 5e-4, 1.2e-3, 3e-3, 6e-3), scale=1e-4),
+                Term("mass.slack_free", (0.3,), scale=0.2, amount=False),
+            ),
+        ),
+        Form(
+            "sagging",
+            (
+                Term("mass.slack", (2e-4, 6e-4, 2e-3), scale=1e-4),
+                Term("mass.slack_sag", (1.0,), scale=0.3, amount=False),
+            ),
+        ),
     ),
     signature="a steep rise, then a pause until the load is lifted, longer under larger loads",
     neighbours=("threshold_pressure", "load_dependent_compliance", "static_law"),
