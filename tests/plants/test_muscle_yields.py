@@ -7,7 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pam_envs.kernels.yielding import deflected, yielded
+from pam_envs.kernels.yielding import deflected_with_tail, yielded_with_tail
 from pam_envs.muscle.effects import yield_spring
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -19,12 +19,14 @@ BY_PRESSURE = {
     "hysteresis.yield_width": 8e3,
     "hysteresis.yield_break": 3e4,
     "hysteresis.yield_ratio": 0.7,
+    "hysteresis.yield_tail": -0.6,
 }
 BY_LENGTH = {
     "muscle.yield_force": 6.0,
     "muscle.yield_per_pressure": 2e-5,
     "muscle.yield_break": 0.015,
     "muscle.yield_ratio": 0.3,
+    "muscle.yield_tail": 0.4,
 }
 UP_AND_DOWN = np.concatenate([np.linspace(0.0, 5e5, 40), np.linspace(5e5, 1e5, 30)])
 
@@ -44,7 +46,8 @@ def test_effective_pressure_loses_the_yielding_share(kind: str) -> None:
     above, z, lost = np.maximum(0.0, made["pressure"] - 1e4), 0.0, []
     wide = 1.0 + plant.hysteresis.width_per_load * 2.55
     for moved in np.diff(above, prepend=0.0) / BY_PRESSURE["hysteresis.yield_break"]:
-        z = yielded(z, moved, BY_PRESSURE["hysteresis.yield_ratio"])[0]
+        shape = BY_PRESSURE["hysteresis.yield_ratio"], BY_PRESSURE["hysteresis.yield_tail"]
+        z = yielded_with_tail(z, moved, *shape)[0]
         lost.append(BY_PRESSURE["hysteresis.yield_width"] * z * wide)
     assert plain["drive"] - made["drive"] == pytest.approx(np.array(lost), abs=1e-4)
     assert min(lost) < -7e3 * wide and max(lost) > 7e3 * wide
@@ -84,6 +87,7 @@ def test_closed_cycles_of_pressure_and_strain_lose_energy(seed: int) -> None:
     random = np.random.default_rng(seed)
     for _ in range(8):
         growth, ratio = random.uniform(-2e-5, 4e-5), random.uniform(0.0, 1.0)
+        tail = random.uniform(-1.0, 1.0)
         fixed = [[random.uniform(1.0, 20.0)], [growth], [random.uniform(0.005, 0.1)], [ratio]]
         corners = random.uniform(0.0, [[6e5], [0.15]], (2, 5))
         around = np.linspace(0.0, 5.0, 1000, endpoint=False)
@@ -92,7 +96,7 @@ def test_closed_cycles_of_pressure_and_strain_lose_energy(seed: int) -> None:
         for turn in range(3):
             for k in range(strain.size):
                 stiff, limit = yield_spring(fixed, 0, 0, pressure[k])
-                at = deflected(at, strain[k] - strain[k - 1], limit, ratio)[0]
+                at = deflected_with_tail(at, strain[k] - strain[k - 1], limit, ratio, tail)[0]
                 force[turn, k] = stiff * at
         steps = np.diff(strain, append=strain[0])
         work = 0.5 * (force[2] + np.roll(force[2], -1)) @ steps

@@ -98,8 +98,8 @@ COSTLY = (
     ("hysteresis.yield_width",),
     ("muscle.yield_force",),
     tuple(f"muscle.{name}" for name in MAP_SIZES),
-    ("mass.stick", "muscle.viscosity", "muscle.viscosity_relaxing"),
     ("muscle.viscosity_per_pressure",),
+    ("mass.stick", "muscle.viscosity", "muscle.viscosity_relaxing"),
 )
 """Parameters of the effects that a tile works out only where one of them is on."""
 
