@@ -11,7 +11,7 @@ from pam_envs.arrays import Array
 from pam_envs.diagnosis.cause import Form
 from pam_envs.diagnosis.fit.balance import Balance
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.candidate import Candidate, fit_base, frees_for
+from pam_envs.diagnosis.fit.candidate import Candidate, fit_base, frees_for, restarted
 from pam_envs.diagnosis.fit.least_squares import (
     FEW_DAMPINGS,
     LANES,
@@ -277,7 +277,23 @@ def orifices(
     flow = simplest(only, blocks, promising(only, fits), FLOW_ROUNDS)
     if gain_of(only, blocks, fit, flow) < FLOW_GAIN:
         return None
-    return other, flow
+    uneven = with_slower_exhaust(of_pressure(problem), family, blocks, fit)
+    return None if gain_of(only, blocks, uneven, flow) < FLOW_GAIN else (other, flow)
+
+
+def with_slower_exhaust(problem: Problem, family: MuscleFamily, blocks: Blocks, fit: Fit) -> Fit:
+    """Return the fit of a regulator whose exhaust is slower or faster than its filling.
+
+    Orifices also have an exhaust unlike the filling, which alone does not show them.
+    """
+    taper = family.free("regulator.exhaust_taper", start=0.3, scale=0.5)
+    fits = []
+    for ratio in (0.7, 1.5):
+        frees = (family.free("regulator.exhaust_ratio", start=ratio, log=True), taper)
+        z = np.concatenate([fit.z, [f.inner(f.start) for f in frees]])
+        fits.append(restarted(fit, frees=(*fit.frees, *frees), z=z, shared=None))
+    evaluate(problem, fits)
+    return simplest(problem, blocks, fits)
 
 
 def simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:

@@ -22,7 +22,7 @@ CAUSE = Cause(
             "sagging",
             (
                 Term("mass.slack", (2e-4, 6e-4, 2e-3), scale=1e-4),
-                Term("mass.slack_sag", (1.0,), scale=0.3, amount=False),
+                Term("mass.slack_sag", (0.6,), scale=0.3, amount=False),
             ),
         ),
     ),
