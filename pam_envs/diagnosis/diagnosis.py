@@ -337,7 +337,8 @@ class Study:
     def flexible(self) -> FlexibleBase:
         """Selection of the differences in which rigs commonly depart from the base."""
         data = (self.problem, self.family, self.blocks, self.base, self.rule)
-        return FlexibleBase(*data, self.fitted.guesses, self.fitted.rate, self.fitted.linear)
+        made = self.fitted
+        return FlexibleBase(*data, made.guesses, made.rate, made.linear, made.begins)
 
     def make_flexible(self, causes: Sequence[Cause]) -> None:
         """Add the common differences that the recording needs to the base."""

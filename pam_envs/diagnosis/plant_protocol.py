@@ -174,6 +174,10 @@ class Fitted(Protocol):
     def linear(self) -> bool:
         """Whether a linear model may show that a difference is needed, without a refit."""
 
+    @property
+    def begins(self) -> Sequence[str]:
+        """Parameters of the start of the recording, which are fitted beside the differences."""
+
 
 class Kind(Protocol):
     """A plant that can be diagnosed, before a recording is given."""

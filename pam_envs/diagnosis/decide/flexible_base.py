@@ -44,6 +44,8 @@ NOISE_ONLY = 1.06
 """Mean square of the residual over the noise below which the base needs no difference."""
 SHOWN = 2.0
 """Least distance of a parameter from the plain plant's value, over its standard deviation."""
+BEGIN_ROUNDS = 6
+"""Rounds of a fit with the parameters of the start of the recording."""
 SPARSE_ROUNDS, SPARSE_LOSS = 4, 0.02
 """Rounds of a fit without the others, and the gain that it may lose."""
 STARTS = 2
@@ -110,6 +112,7 @@ class FlexibleBase:
     rate: Form | None = None  # form of the limited rate that the pressure needs
     # whether a linear model may show that a difference is needed, without a refit
     linear: bool = True
+    begins: Sequence[str] = ()  # parameters of the start of the recording
 
     def chosen(self, causes: Sequence[Cause]) -> list[tuple[Cause, Form]]:
         """Return the common differences that the base lacks, each in the form of all its forms.
@@ -240,11 +243,24 @@ class FlexibleBase:
         chosen = self.chosen([c for c in causes if c.common])
         if not chosen or self.fits():
             return self.base
-        model = self.sparse(self.needed(self.acting(self.fitted(chosen))))
+        model = self.sparse(self.begun(self.needed(self.acting(self.fitted(chosen)))))
         if len(model.fit.frees) > len(self.base.fit.frees):
             model = refit(self.problem, self.blocks, model, 2)
         complete_jacobian(self.problem, model.fit)
         return model
+
+    def begun(self, model: Candidate) -> Candidate:
+        """Return a model fitted together with the parameters of the start of the recording."""
+        known = {f.name for f in model.fit.frees}
+        frees = tuple(self.family.free(name) for name in self.begins if name not in known)
+        if not frees:
+            return model
+        z = np.concatenate([model.fit.z, [f.inner(f.start) for f in frees]])
+        fit = restarted(model.fit, frees=(*model.fit.frees, *frees), z=z, shared=None)
+        lsq.evaluate(self.problem, [fit])
+        lsq.improve(self.problem, [fit], BEGIN_ROUNDS, 1e-4)
+        errors = self.blocks.errors(self.problem.rows(fit.residual))
+        return Candidate(model.causes, fit, errors)
 
     def sparse(self, model: Candidate) -> Candidate:
         """Return a model whose differences have the parameters that the recording shows.

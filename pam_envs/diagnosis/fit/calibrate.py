@@ -31,6 +31,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
     LAG,
     ORIFICES,
     PILOT,
+    START,
     MuscleFamily,
     spanning,
     states_of,
@@ -60,6 +61,8 @@ class Calibration:
     rate: Form | None  # form of the limited rate that the pressure needs
     # whether a linear model may show that a difference is needed, without a refit
     linear: bool = True
+    # parameters of the start of the recording, which are fitted beside the differences
+    begins: tuple[str, ...] = ()
 
 
 def calibrate(
@@ -130,7 +133,7 @@ def calibrate(
         tried = [guess, frees] if law else [guess]
     plain = family.column
     best = fit_base(problem, blocks, plain, tried, ROUNDS)
-    return Calibration(family, problem, best, (found | law | wide,), rate)
+    return Calibration(family, problem, best, (found | law | wide,), rate, begins=(START,))
 
 
 def smoothed(pressure: Array, time: Array) -> Array:

@@ -92,7 +92,7 @@ SOURCE, LEAST_SOURCE = "regulator.source_pressure", 1.001
 LAG = "regulator.time_constant"
 PILOT = {"regulator.pilot_lag": 0.02, "regulator.pilot_damping": 1.0}
 """Starting values of the pilot stage of a regulator of second order."""
-BASE = tuple(name for name in SETTINGS if name not in {*PILOT, *ORIFICES, BORE})
+BASE = tuple(name for name in SETTINGS if name not in {*PILOT, *ORIFICES, BORE, START})
 CLOCK = "clock.offset"
 """Time [s] by which the readings lag the command: no parameter of the plant."""
 USUAL_ROWS = 2.5

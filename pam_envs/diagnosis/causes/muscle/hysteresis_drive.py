@@ -27,7 +27,7 @@ CAUSE = Cause(
                 Term("muscle.yield_per_pressure", (0.0,), scale=1e-5, amount=False),
                 Term("muscle.yield_break", (0.01, 0.03), log=True, amount=False),
                 Term("muscle.yield_ratio", (0.5,), scale=0.3, amount=False),
-                Term("muscle.yield_tail", (0.0,), scale=0.3, amount=False, prior=3.0),
+                Term("muscle.yield_tail", (0.0,), scale=0.3, amount=False, prior=1.5),
             ),
         ),
     ),

@@ -20,7 +20,7 @@ CAUSE = Cause(
                 Term("hysteresis.yield_width", (3e3,), scale=1e3),
                 Term("hysteresis.yield_break", (1e4, 4e4), log=True, amount=False),
                 Term("hysteresis.yield_ratio", (0.5,), scale=0.3, amount=False),
-                Term("hysteresis.yield_tail", (0.0,), scale=0.3, amount=False, prior=3.0),
+                Term("hysteresis.yield_tail", (0.0,), scale=0.3, amount=False, prior=1.5),
             ),
         ),
     ),
