@@ -24,7 +24,7 @@ from pam_envs.diagnosis.decide.verdict import Decision
 from pam_envs.diagnosis.diagnosis import Study, fit_failures_explained
 from pam_envs.diagnosis.families.compiled import in_valve
 from pam_envs.diagnosis.families.kinds import kind_of
-from pam_envs.diagnosis.fit.intervals import at_bound
+from pam_envs.diagnosis.fit.intervals import NEAR_BOUND, at_bound
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.similarity import NO_FLOW, SAME_SIZE, Similarity
 from pam_envs.diagnosis.fit.single_muscle import (
@@ -391,7 +391,10 @@ def _bounds(
             f = original.factor_of(plant, free.name)
             text = _at_bound(free.name, f * value, f * free.low, f * free.high, units[free.name])
             without = WITHOUT.get(free.name, plant.neutral.get(free.name))
-            yield free.name, "" if value == without else text
+            absent = without is not None and abs(value - without) <= NEAR_BOUND * (
+                free.high - free.low
+            )
+            yield free.name, "" if absent else text
 
 
 def _at_bound(name: str, value: float, low: float, high: float, unit: str) -> str:

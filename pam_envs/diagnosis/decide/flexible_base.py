@@ -44,8 +44,9 @@ NOISE_ONLY = 1.06
 """Mean square of the residual over the noise below which the base needs no difference."""
 SHOWN = 2.0
 """Least distance of a parameter from the plain plant's value, over its standard deviation."""
-BEGIN_ROUNDS = 6
-"""Rounds of a fit with the parameters of the start of the recording."""
+BEGIN_ROUNDS, ANCHOR = 6, 0.25
+"""Rounds of a fit with the parameters of the start of the recording, and the standard deviation of
+their change in later fits, over their scale."""
 SPARSE_ROUNDS, SPARSE_LOSS = 4, 0.02
 """Rounds of a fit without the others, and the gain that it may lose."""
 STARTS = 2
@@ -246,8 +247,25 @@ class FlexibleBase:
         model = self.sparse(self.begun(self.needed(self.acting(self.fitted(chosen)))))
         if len(model.fit.frees) > len(self.base.fit.frees):
             model = refit(self.problem, self.blocks, model, 2)
+        model = self.anchored(model)
         complete_jacobian(self.problem, model.fit)
         return model
+
+    def anchored(self, model: Candidate) -> Candidate:
+        """Return a model whose parameters of the start of the recording stay near their values.
+
+        Fits without the blocks that show them, as on held-out data, would not determine them.
+        """
+        frees = tuple(
+            replace(f, start=value, prior=ANCHOR) if f.name in self.begins else f
+            for f, value in zip(model.fit.frees, model.fit.values().values(), strict=True)
+        )
+        if frees == model.fit.frees:
+            return model
+        fit = restarted(model.fit, frees=frees, shared=None)
+        fit.take(model.fit.slopes)
+        lsq.evaluate(self.problem, [fit])
+        return replace(model, fit=fit)
 
     def begun(self, model: Candidate) -> Candidate:
         """Return a model fitted together with the parameters of the start of the recording."""

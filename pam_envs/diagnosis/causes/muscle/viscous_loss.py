@@ -41,4 +41,5 @@ CAUSE = Cause(
     needs=("contraction",),
     sensor="a load cell between muscle and load",
     compensable=True,
+    lawlike=True,  # the lag of the motion is the damping over the stiffness of the law
 )
