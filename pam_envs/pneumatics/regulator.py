@@ -387,12 +387,12 @@ def pilot_step(
         rows[state + AIR_STATE.pilot][j] = pressure
         rows[state + AIR_STATE.pilot_rate][j] = 0.0
         return target
-    turns = 1.0 / (TURN * max(lag, SHORTEST_PILOT * h, 1e-9))
+    slow = max(lag, SHORTEST_PILOT * h, 1e-9)
+    turns = 1.0 / (TURN * slow)
     ratio = fixed[effects + AIR.pilot_damping][j]
     before, pace = rows[state + AIR_STATE.pilot][j], rows[state + AIR_STATE.pilot_rate][j]
     behind, rate = resonator_step(rows, j, state + AIR_STATE.pilot, target, target, turns, ratio, h)
     # the equation of the lag, integrated over the step
-    slow = 1.0 / (TURN * turns)
     missing = slow * (slow * (rate - pace) + 2.0 * ratio * (behind - before))
     return max(0.0, target - missing / h)
 

@@ -97,11 +97,16 @@ FINE_PARTS = 4
 
 
 @kernel
+def first_share(rows: Any, fixed: Any, j: int) -> float:
+    """Return the share of the first state that is left after the travel of lane ``j``."""
+    return newness(rows[EFFECTS_AT + S.travel][j], fixed[R.HYSTERESIS_FIRST_TRAVEL][j])  # type: ignore[no-any-return]
+
+
+@kernel
 def friction_factor(rows: Any, fixed: Any, j: int) -> float:
     """Return the factor on the friction of strands and that yields: of load and first travel."""
-    new = newness(rows[EFFECTS_AT + S.travel][j], fixed[R.HYSTERESIS_FIRST_TRAVEL][j])
     wide = friction_per_load(fixed[R.HYSTERESIS_WIDTH_PER_LOAD][j], rows[R.LOAD][j])
-    return (1.0 + fixed[R.HYSTERESIS_FIRST_WIDTH][j] * new) * wide  # type: ignore[no-any-return]
+    return (1.0 + fixed[R.HYSTERESIS_FIRST_WIDTH][j] * first_share(rows, fixed, j)) * wide  # type: ignore[no-any-return]
 
 
 @kernel
@@ -143,7 +148,7 @@ def effective_pressure(
         for j in range(first, last):
             most[j] = most[j] + fixed[R.WEIGHT + k][j] * fixed[R.THRESHOLD + k][j]
     for j in range(first, last if worn > 0 else first):
-        new = newness(rows[EFFECTS_AT + S.travel][j], fixed[R.HYSTERESIS_FIRST_TRAVEL][j])
+        new = first_share(rows, fixed, j)
         friction[j] = friction_with_effects(
             friction[j],
             most[j],
@@ -165,7 +170,7 @@ def effective_pressure(
         for j in range(first, last):
             drive[j] = drive[j] + most[j]
     for j in range(first, last if worn > 0 else first):
-        new = newness(rows[EFFECTS_AT + S.travel][j], fixed[R.HYSTERESIS_FIRST_TRAVEL][j])
+        new = first_share(rows, fixed, j)
         gained = temperature_factor(
             rows[EFFECTS_AT + S.kelvin][j], fixed[R.MUSCLE_TEMPERATURE_GAIN][j]
         )
@@ -297,8 +302,7 @@ def rest_extended(fixed: Any, lane: int, drive: float, load: float) -> float:
 @kernel
 def first_stiffening(rows: Any, fixed: Any, j: int) -> float:
     """Return the passive force over strain [N] that lane ``j`` has in its first travel alone."""
-    new = newness(rows[EFFECTS_AT + S.travel][j], fixed[R.HYSTERESIS_FIRST_TRAVEL][j])
-    return fixed[R.HYSTERESIS_FIRST_STIFFNESS][j] * new  # type: ignore[no-any-return]
+    return fixed[R.HYSTERESIS_FIRST_STIFFNESS][j] * first_share(rows, fixed, j)  # type: ignore[no-any-return]
 
 
 @kernel

@@ -10,17 +10,15 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="sensor_nonlinearity",
     title="the nonlinearity of a sensor",
-    forms=(
-        *(
-            Form(
-                sensor,
-                (
-                    Term(f"{sensor}.bow", (0.01, -0.01), scale=0.01),
-                    Term(f"{sensor}.wave", (0.01,), scale=0.01),
-                ),
-            )
-            for sensor in ("position", "pressure")
-        ),
+    forms=tuple(
+        Form(
+            sensor,
+            (
+                Term(f"{sensor}.bow", (0.01, -0.01), scale=0.01),
+                Term(f"{sensor}.wave", (0.01,), scale=0.01),
+            ),
+        )
+        for sensor in ("position", "pressure")
     ),
     signature="a smooth function of the reading alone, whatever load, direction, rate and time",
     neighbours=("sensor_bias", "sensor_drift", "static_law"),
