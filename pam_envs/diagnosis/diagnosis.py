@@ -26,7 +26,6 @@ from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.structure import Regressors
 from pam_envs.diagnosis.decide.verdict import Decision, decide, effect_traces
 from pam_envs.diagnosis.experiment.experiment import propose, rival_of
-from pam_envs.diagnosis.experiment.plans import Means
 from pam_envs.diagnosis.families.kinds import kind_of
 from pam_envs.diagnosis.fit import tolerance
 from pam_envs.diagnosis.fit.blocks import Blocks
@@ -419,23 +418,19 @@ class Study:
 
     def experiment(self) -> None:
         """Propose the experiment that separates the open rivals."""
-        decision = self.decision if self.kind.experiments else None
+        decision = self.decision
         if decision is None or decision.verdict != "ambiguous" or not decision.open_rivals:
+            return
+        plans = self.kind.plans(self.recording, self.sheet, self.family)
+        if not plans:
             return
         first, *others = (
             rival_of(c.names, c.fit, len(self.normal.fit.frees), self.problem.tie)
             for c in (decision.model, *decision.open_rivals)
         )
         measured = np.isfinite(self.problem.measured).any(axis=1)
-        self.proposal = propose(
-            self.start,
-            first,
-            others,
-            np.where(measured, self.problem.noise, np.inf),
-            Means.of(self.recording, self.sheet),
-            self.causes,
-            self.fitted.family.inputs.longest_step,  # type: ignore[attr-defined]
-        )
+        noise = np.where(measured, self.problem.noise, np.inf)
+        self.proposal = propose(plans, first, others, noise, self.causes)
 
     def close_loop(self, design: Callable[..., Any] | None, simulated: Any, oracle: Any) -> None:
         """Compare controllers designed on the base and on the extended plant."""

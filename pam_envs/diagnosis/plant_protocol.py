@@ -95,6 +95,34 @@ class Loop:
     reference: str | None = None
 
 
+@dataclass(frozen=True)
+class Experiment:
+    """Experiment that a rig can do.
+
+    Attributes
+    ----------
+    name : str
+    description : str
+        Instruction in words.
+    segments : sequence of mapping
+        Instructions piece by piece, for the report.
+    bound : Simulated
+        The fitted plant with the inputs of the experiment.
+    """
+
+    name: str
+    description: str
+    segments: Sequence[Mapping[str, Any]]
+    bound: "Simulated"
+
+
+class Simulated(Protocol):
+    """A plant with given inputs."""
+
+    def simulate(self, columns: Array) -> Array:
+        """Return sensor readings for parameter columns (n, p), shape (channels, T, n)."""
+
+
 class Parameter(Protocol):
     """Declaration of a parameter (:class:`pam_envs.parameters.Declaration`)."""
 
@@ -199,10 +227,6 @@ class Kind(Protocol):
         """Whether the error of declared loads is a parameter of the plant."""
 
     @property
-    def experiments(self) -> bool:
-        """Whether there are plans of further experiments."""
-
-    @property
     def loop(self) -> Loop | None:
         """Closed loop of the family; None: that of a single muscle."""
 
@@ -218,6 +242,9 @@ class Kind(Protocol):
 
     def bind(self, plant: Any, recording: Recording, sheet: Rig) -> Bound:
         """Return a plant with the inputs of a recording."""
+
+    def plans(self, recording: Recording, sheet: Rig, family: Bound) -> Sequence[Experiment]:
+        """Return the experiments that the rig of a recording can do, on the fitted plant."""
 
     def audit(self, recording: Recording, sheet: Rig) -> Audit:
         """Return the findings on a recording before its diagnosis."""

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from pam_envs.arrays import Array
 from pam_envs.constants import BAR
 from pam_envs.data.recording.channels import MUSCLE
 from pam_envs.data.recording.recording import Recording, check_rig, repeat_rows
@@ -156,10 +157,15 @@ def unmet_needs(recording: Recording, rig: Rig) -> dict[str, str]:
 
 def load_levels(recording: Recording) -> list[float]:
     """Return the load levels of a recording [N], ascending."""
+    return levels_of(recording.load, LOAD_STEP)
+
+
+def levels_of(values: Array, step: float) -> list[float]:
+    """Return the levels of a signal that are more than ``step`` apart, ascending."""
     levels: list[float] = []
-    for load in np.unique(recording.load):
-        if not levels or load - levels[-1] > LOAD_STEP:
-            levels.append(float(load))
+    for value in np.unique(values):
+        if not levels or value - levels[-1] > step:
+            levels.append(float(value))
     return levels
 
 

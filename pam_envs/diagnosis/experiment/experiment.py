@@ -11,12 +11,9 @@ from typing import Any
 import numpy as np
 
 from pam_envs.arrays import Array
-from pam_envs.constants import GRAVITY, ROOM_TEMPERATURE
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.experiment.plans import PERIOD, Means, Plan, plans
 from pam_envs.diagnosis.fit.least_squares import Fit, column_of, shifted
-from pam_envs.plants.single_muscle.plant import SingleMuscle
-from pam_envs.plants.single_muscle.replay import LONGEST_STEP, Inputs, replay_rows
+from pam_envs.diagnosis.plant_protocol import Experiment, Simulated
 
 ENOUGH = 1.0
 """Least mean squared difference of the rivals, in noise variances, of a useful experiment."""
@@ -53,26 +50,7 @@ def _over_noise(outputs: Array, noise: Array) -> Array:
     return np.asarray(flat.transpose(2, 0, 1).reshape(outputs.shape[2], -1))
 
 
-def inputs_of(plan: Plan, longest_step: float = LONGEST_STEP) -> Inputs:
-    """Return the inputs of a plan for the replay."""
-    n = len(plan.command)
-    fresh = np.zeros(n, bool)
-    fresh[0] = True
-    return Inputs(
-        PERIOD,
-        plan.command,
-        plan.load / GRAVITY,
-        plan.kelvin + ROOM_TEMPERATURE,
-        fresh,
-        np.zeros(n),
-        np.zeros(n, bool),
-        longest_step,
-    )
-
-
-def separations(
-    plant: SingleMuscle, rivals: Sequence[Rival], inputs: Inputs, noise: Array
-) -> list[float]:
+def separations(bound: Simulated, rivals: Sequence[Rival], noise: Array) -> list[float]:
     """Return the separation of the first rival from each other one in an experiment.
 
     Mean squares in noise variances, summed over the outputs: the difference that remains after one
@@ -80,8 +58,9 @@ def separations(
     the RMS noise of the sensors [SI], infinite for a channel without a sensor.
     """
     columns = np.vstack([r.columns for r in rivals])
-    found = _over_noise(replay_rows(plant, columns, inputs), noise)
-    samples, traces, at = len(inputs.command), [], 0
+    outputs = bound.simulate(columns)
+    found = _over_noise(outputs, noise)
+    samples, traces, at = outputs.shape[1], [], 0
     for rival in rivals:
         end = at + len(rival.columns)
         traces.append((found[at], found[at + 1 : end] - found[at]))
@@ -106,19 +85,15 @@ def _left(difference: Array, moves: Array) -> float:
 
 
 def propose(
-    plant: SingleMuscle,
+    plans: Sequence[Experiment],
     first: Rival,
     seconds: Sequence[Rival],
     noise: Array,
-    means: Means,
     causes: Sequence[Cause],
-    longest_step: float = LONGEST_STEP,
 ) -> dict[str, Any]:
     """Return the experiment with the largest separation of a model from its nearest rival."""
     rivals = (first, *seconds)
-    scored = [
-        (separations(plant, rivals, inputs_of(p, longest_step), noise), p) for p in plans(means)
-    ]
+    scored = [(separations(p.bound, rivals, noise), p) for p in plans]
     apart, plan = max(scored, key=lambda pair: min(pair[0]))
     least = min(apart)
     nearest = seconds[int(np.argmin(apart))]

@@ -42,8 +42,13 @@ class Means:
 
     def near(self, share: float) -> float:
         """Return the load nearest to a share of the range from the lightest to the heaviest."""
-        target = self.loads[0] + share * (self.loads[-1] - self.loads[0])
-        return min(self.loads, key=lambda load: abs(load - target))
+        return near(self.loads, share)
+
+
+def near(levels: Sequence[float], share: float) -> float:
+    """Return the level nearest to a share of the range of ascending levels."""
+    target = levels[0] + share * (levels[-1] - levels[0])
+    return min(levels, key=lambda level: abs(level - target))
 
 
 @dataclass(frozen=True)
@@ -171,17 +176,21 @@ def plans(means: Means) -> tuple[Plan, ...]:
     return tuple(_plans(means))
 
 
+def listed_pieces(shut: bool) -> Iterator[tuple[str, str, tuple[Piece, ...]]]:
+    """Return name, instruction and pieces of experiments under one load."""
+    for name, words, pieces in LIST:
+        yield name, words, (REST, *pieces)
+    if shut:
+        closed = [(hold(v, 3.0), Piece(30.0, v, v, shut=True)) for v in (0.4, 0.8)]
+        words = "close the valve for 30 s at two pressures"
+        yield "valve_shut", words, (REST, *closed[0], *closed[1])
+
+
 def _plans(means: Means) -> Iterator[Plan]:
     usual = (means.near(0.5),)
-    for name, words, pieces in LIST:
-        yield Plan(name, words, (REST, *pieces), usual, means.full)
+    for name, words, pieces in listed_pieces(means.shut):
+        yield Plan(name, words, pieces, usual, means.full)
     slow = Plan("slow", "", (REST, *TRIANGLE * 2), usual, means.full)
-    if means.shut:
-        pieces = [REST]
-        for level in (0.4, 0.8):
-            pieces += [hold(level, 3.0), Piece(30.0, level, level, shut=True)]
-        words = "close the valve for 30 s at two pressures"
-        yield Plan("valve_shut", words, tuple(pieces), usual, means.full)
     if means.warm:
         pieces = (REST, *(hold(v, 4.0) for v in STAIRS))
         words = f"stairs while the muscle is warmed by {WARMER:g} K"
@@ -192,10 +201,11 @@ def _plans(means: Means) -> Iterator[Plan]:
             words = f"slow triangles under {load:g} N"
             yield replace(slow, name=name, description=words, loads=(load,))
         several = tuple(dict.fromkeys(means.near(k / 4) for k in range(5)))
-        words = f"the same slow triangle under {_listed(several)} N"
+        words = f"the same slow triangle under {enumerated(several)} N"
         pieces = (REST, *TRIANGLE)
         yield Plan("several_loads", words, pieces, several, means.full)
 
 
-def _listed(loads: Sequence[float]) -> str:
+def enumerated(loads: Sequence[float]) -> str:
+    """Return "a, b and c"."""
     return " and ".join((", ".join(f"{load:g}" for load in loads[:-1]), f"{loads[-1]:g}"))

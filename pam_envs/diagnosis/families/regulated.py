@@ -13,8 +13,10 @@ from pam_envs.constants import BAR
 from pam_envs.data.recording.channels import WIRINGS
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.audit.audit import Audit, audit_channels
+from pam_envs.diagnosis.audit.audit import Audit, audit_channels, levels_of
 from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.experiment.channel_plans import ChannelMeans, ChannelPlan, channel_plans
+from pam_envs.diagnosis.experiment.plans import PERIOD
 from pam_envs.diagnosis.families.adapted import adapted
 from pam_envs.diagnosis.families.compiled import (
     CompiledFamily,
@@ -34,7 +36,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
     with_range,
 )
 from pam_envs.diagnosis.fit.starting_values import Grid
-from pam_envs.diagnosis.plant_protocol import Loop, Output
+from pam_envs.diagnosis.plant_protocol import Experiment, Loop, Output
 from pam_envs.muscle.law_correction import NAMES as TERM_NAMES
 from pam_envs.muscle.law_correction import TERMS, LawCorrection
 from pam_envs.plants.core.rollout import drives_of
@@ -56,6 +58,8 @@ RANGE = "map_pressure", "map_least", "map_strain"
 DRIVE_GAIN = 0.1
 """Gain on held-out blocks from which the friction of a base has the other drive: a tenth less of
 the mean square, beyond what the draw of the blocks changes."""
+PAYLOAD_STEP = 0.05
+"""Largest difference of payloads of one level [kg]."""
 NOISE = {"angle": 1e-3, "pressure": 1e3, "torque": 0.02, "force": 0.5, "tension": 1.0}
 """RMS of the noise [SI] where a recording shows none, by the first word of a channel."""
 
@@ -163,7 +167,7 @@ class RegulatedFamily(CompiledFamily):
                 f"none of {', '.join(moved)} was recorded",
             ),
             "loads": (
-                np.ptp(load) > 0.05,
+                np.ptp(load) > PAYLOAD_STEP,
                 f"the payload was {float(load[0]):.3g} kg throughout"
                 if weighs
                 else "the replay of this plant has no input for a load",
@@ -171,6 +175,23 @@ class RegulatedFamily(CompiledFamily):
             "exhaust": (falls, "no commanded pressure ever falls by more than 0.5 bar"),
         }
         return {word: reason for word, (met, reason) in needs.items() if not met}
+
+
+def planned(plan: ChannelPlan, recording: Recording) -> Recording:
+    """Return the recording of a planned experiment; all other channels keep their mean."""
+    labels, shut = plan.labels
+    time = PERIOD * np.arange(len(labels))
+    held = {name: np.full(len(time), v.mean()) for name, v in recording.inputs.items()}
+    outputs = {name: float(v.mean()) for name, v in recording.outputs.items()}
+    return Recording.of_channels(
+        time,
+        held | plan.inputs,
+        outputs,
+        channels=tuple(recording.channels.values()),
+        segment=labels,
+        valve_closed=shut,
+        source=plan.name,
+    )
 
 
 class RegulatedKind:
@@ -199,7 +220,6 @@ class RegulatedKind:
     titles: ClassVar[Mapping[str, str]] = {}
     catalogue: ClassVar[tuple[Cause, ...]]
     weighed: ClassVar[bool] = False
-    experiments: ClassVar[bool] = False
     loop: ClassVar[Loop]
     loop_reason: ClassVar[str] = ""
 
@@ -285,6 +305,29 @@ class RegulatedKind:
             return self.bound(*data, regulator)
         commands = tuple(list(usual).index(name) for name in self.commanded(plant))
         return self.bound(*data, None, commands, clock_of(recording, sheet))
+
+    def plans(self, recording: Recording, sheet: Rig, family: Any) -> tuple[Experiment, ...]:
+        """Return the experiments that the rig of a recording can do."""
+        named = dict(zip(family.pairs, family.setpoints(recording), strict=True))
+        names = list(named)
+        joints = [{n: named[n] for n in names[k : k + 2]} for k in range(0, len(names), 2)]
+        payload = recording.inputs.get("payload")
+        means = ChannelMeans(
+            joints,
+            () if payload is None else levels_of(payload, PAYLOAD_STEP),
+            bool(sheet.valve_closed) or bool(recording.valve_closed.any()),
+        )
+        return tuple(
+            Experiment(
+                plan.name,
+                plan.description,
+                plan.segments,
+                dataclasses.replace(
+                    self.bind(family.plant, planned(plan, recording), sheet), clock=family.clock
+                ),
+            )
+            for plan in channel_plans(means)
+        )
 
     def commanded(self, plant: Any) -> tuple[str, ...]:
         """Return the inputs of the loop that are setpoints."""

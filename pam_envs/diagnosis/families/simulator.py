@@ -20,7 +20,7 @@ from pam_envs.diagnosis.families.compiled import UsualStart, calibrate_compiled
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration
 from pam_envs.diagnosis.fit.least_squares import Free
-from pam_envs.diagnosis.plant_protocol import Output, Signals
+from pam_envs.diagnosis.plant_protocol import Experiment, Output, Signals
 from pam_envs.files import write_text
 from pam_envs.parameters import Declaration
 from pam_envs.wording import near
@@ -289,7 +289,7 @@ class BoundSimulator(UsualStart):
 class SimulatorKind:
     """Any simulation."""
 
-    weighed, experiments = False, False
+    weighed = False
     loop, loop_reason = None, "controllers of a simulation are not compared"
 
     def __init__(self, plant: Simulator) -> None:
@@ -315,6 +315,10 @@ class SimulatorKind:
             raise ValueError(f"the recording lacks the input {lacking[0]!r} of {plant.name}")
         starts = tuple(np.flatnonzero(recording.restart).tolist())
         return BoundSimulator(plant, recording.period, recording.inputs, starts)
+
+    def plans(self, recording: Recording, sheet: Rig, family: Any) -> tuple[Experiment, ...]:
+        """Return the experiments that a rig can do: none are known."""
+        return ()
 
     def audit(self, recording: Recording, sheet: Rig) -> Audit:
         """Return the findings on a recording before its diagnosis."""

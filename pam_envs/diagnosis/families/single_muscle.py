@@ -3,12 +3,16 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
+
 from pam_envs.arrays import Array, Flags
+from pam_envs.constants import GRAVITY, ROOM_TEMPERATURE
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import Audit, audit, unmet_needs
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import by_name, catalogue
+from pam_envs.diagnosis.experiment.plans import PERIOD, Means, Plan, plans
 from pam_envs.diagnosis.families.compiled import OFFSET, WEIGHTS
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import Calibration, calibrate
@@ -21,8 +25,9 @@ from pam_envs.diagnosis.fit.single_muscle import (
     inputs_of,
     start_plant,
 )
-from pam_envs.diagnosis.plant_protocol import Output, Parameter, Signals
+from pam_envs.diagnosis.plant_protocol import Experiment, Output, Parameter, Signals
 from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.replay import LONGEST_STEP, Inputs, replay_rows
 
 
 class BoundMuscle(MuscleFamily):
@@ -50,6 +55,46 @@ class BoundMuscle(MuscleFamily):
         return identified(plant, frees, source)
 
 
+class PlannedMuscle(BoundMuscle):
+    """Single muscle with the inputs of an experiment, read by the clock of the command."""
+
+    def simulate(self, columns: Array) -> Array:
+        """Return sensor readings for parameter columns (n, p + 1), shape (2, T, n)."""
+        return replay_rows(self.plant, columns, self.inputs)
+
+
+def planned_inputs(plan: Plan, longest_step: float = LONGEST_STEP) -> Inputs:
+    """Return the inputs of a plan for the replay."""
+    n = len(plan.command)
+    fresh = np.zeros(n, bool)
+    fresh[0] = True
+    return Inputs(
+        PERIOD,
+        plan.command,
+        plan.load / GRAVITY,
+        plan.kelvin + ROOM_TEMPERATURE,
+        fresh,
+        np.zeros(n),
+        np.zeros(n, bool),
+        longest_step,
+    )
+
+
+def experiments(
+    plant: SingleMuscle, means: Means, longest_step: float = LONGEST_STEP
+) -> tuple[Experiment, ...]:
+    """Return the experiments that a rig can do, on a muscle."""
+    return tuple(
+        Experiment(
+            plan.name,
+            plan.description,
+            plan.segments,
+            PlannedMuscle(plant, planned_inputs(plan, longest_step)),
+        )
+        for plan in plans(means)
+    )
+
+
 class MuscleKind:
     """Single muscle that lifts a load."""
 
@@ -59,7 +104,7 @@ class MuscleKind:
         for pair in zip(MuscleFamily.channels, MuscleFamily.fallback_noise, strict=True)
     )
     catalogue = catalogue()
-    weighed, experiments = True, True
+    weighed = True
     loop, loop_reason = None, ""
 
     def start(self, sheet: Rig) -> SingleMuscle:
@@ -73,6 +118,11 @@ class MuscleKind:
     def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundMuscle:
         """Return a muscle with the inputs of a recording."""
         return BoundMuscle(plant, inputs_of(recording, sheet), clock_of(recording, sheet))
+
+    def plans(self, recording: Recording, sheet: Rig, family: Any) -> tuple[Experiment, ...]:
+        """Return the experiments that a rig can do."""
+        means = Means.of(recording, sheet)
+        return experiments(family.plant, means, family.inputs.longest_step)
 
     def audit(self, recording: Recording, sheet: Rig) -> Audit:
         """Return the findings on a recording before its diagnosis."""

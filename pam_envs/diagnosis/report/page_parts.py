@@ -234,11 +234,66 @@ def experiment(report: Report) -> str:
         )
     lines.append(paragraph(text))
     segments = found.get("segments") or []
-    if segments:
+    if all(isinstance(s, Mapping) for s in segments):
+        lines.append(pieces_table(segments))
+    else:
         lines.append(bullets([words(s) for s in segments]))
     title = str(found.get("name") or "").replace("_", " ")
     heading = f'<h3 id="experiment">Next experiment: {escape(title)}</h3>'
     return f'{heading}\n<div class="box">{"".join(lines)}</div>'
+
+
+def pieces_table(segments: Sequence[Report]) -> str:
+    """Return the table of an experiment's pieces; channels with equal setpoints share a column."""
+    columns: dict[tuple[str, ...], list[str]] = {}
+    first = segments[0]["from_bar"] if segments else {}
+    for name in first if isinstance(first, Mapping) else ("",):
+        columns.setdefault(tuple(_setpoint(s, name) for s in segments), []).append(name)
+    heads, cells = ["duration [s]"], [tuple(f"{s['seconds']:g}" for s in segments)]
+    for texts, names in columns.items():
+        which = ", ".join(name.removeprefix("set_point").strip("_") for name in names)
+        heads.append(f"setpoint {which}".strip() + " [bar]")
+        cells.append(texts)
+    for key, head in EXTRAS.items():
+        values = [s[key] for s in segments if key in s]
+        if any(values) or (values and key != "warmer_by_K"):
+            heads.append(head)
+            cells.append(tuple(f"{value:.4g}" for value in values))
+    rows = list(zip(*cells, strict=True))
+    return table([*heads, ""], [(*row, text) for row, text in _folded(rows)])
+
+
+EXTRAS = {"load_N": "load [N]", "payload_kg": "payload [kg]", "warmer_by_K": "warmer by [K]"}
+"""Further inputs of an experiment, with their headings."""
+
+
+def _setpoint(segment: Report, channel: str) -> str:
+    """Return the setpoints of a piece in one channel, in words."""
+    if segment["valve"] == "closed":
+        return "valve closed"
+    ends = segment["from_bar"], segment["to_bar"]
+    low, high = (f"{e[channel] if isinstance(e, Mapping) else e:.3g}" for e in ends)
+    if low == high:
+        return low
+    hertz = segment.get("swing_hz")
+    return f"sine from {low} to {high}, {hertz:g} Hz" if hertz else f"{low} to {high}"
+
+
+def _folded(rows: Sequence[tuple[str, ...]]) -> list[tuple[tuple[str, ...], str]]:
+    """Return rows without repeats of a block, and beside its last row how often it comes."""
+    made, at = [], 0
+    while at < len(rows):
+        sizes = range(1, (len(rows) - at) // 2 + 1)
+        same = (n for n in sizes if rows[at : at + n] == rows[at + n : at + 2 * n])
+        size, times = next(same, 1), 1
+        block = rows[at : at + size]
+        while rows[at + times * size : at + (times + 1) * size] == block:
+            times += 1
+        last = f"{times} times" if size == 1 else f"the last {size} rows {times} times"
+        made += [(row, "") for row in block[:-1]]
+        made.append((block[-1], last if times > 1 else ""))
+        at += times * size
+    return made
 
 
 def closed_loop(report: Report) -> str:

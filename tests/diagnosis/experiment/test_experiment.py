@@ -8,12 +8,12 @@ from pam_envs.diagnosis.causes import by_name, catalogue
 from pam_envs.diagnosis.experiment.experiment import (
     ENOUGH,
     Rival,
-    inputs_of,
     propose,
     rival_of,
     separations,
 )
 from pam_envs.diagnosis.experiment.plans import PERIOD, Means, plans
+from pam_envs.diagnosis.families.single_muscle import PlannedMuscle, experiments, planned_inputs
 from pam_envs.diagnosis.fit.least_squares import Fit
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, start_plant
 from tests.diagnosis.conftest import needs_kernels
@@ -45,7 +45,12 @@ def rival(name: str, *nearby: dict, **values: float) -> Rival:
 
 
 def proposed(first: Rival, *others: Rival, noise=NOISE, means=ABLE):
-    return propose(PLANT, first, others, noise, means, catalogue())
+    return propose(experiments(PLANT, means), first, others, noise, catalogue())
+
+
+def bound(name: str) -> PlannedMuscle:
+    """Return the muscle with the inputs of an experiment."""
+    return next(e.bound for e in experiments(PLANT, ABLE) if e.name == name)
 
 
 def test_capabilities_are_read_from_the_recording():
@@ -111,9 +116,9 @@ def test_segments_describe_the_commands():
 @needs_kernels
 def test_missing_sensor_gives_no_separation():
     plain, bowed = rival("plain"), rival("sensor_nonlinearity", pressure__bow=0.05)
-    inputs = inputs_of(plans(ABLE)[0])
-    (both,) = separations(PLANT, (plain, bowed), inputs, NOISE)
-    (blind,) = separations(PLANT, (plain, bowed), inputs, np.array([5e-5, np.inf]))
+    muscle = bound("long_hold")
+    (both,) = separations(muscle, (plain, bowed), NOISE)
+    (blind,) = separations(muscle, (plain, bowed), np.array([5e-5, np.inf]))
     assert both > ENOUGH
     assert blind == 0.0
     assert not proposed(plain, bowed, noise=np.array([5e-5, np.inf]))["enough"]
@@ -125,12 +130,9 @@ def test_refittable_difference_is_no_separation():
     little = rival("leak", {"regulator.leak": 0.0101}, regulator__leak=0.01)
     more = rival("leak", {"regulator.leak": 0.0102}, regulator__leak=0.0101)
     fixed = rival("leak", regulator__leak=0.0101)
-    plan = next(p for p in plans(ABLE) if p.name == "valve_shut")
-    loud = 1e-3 * NOISE
-    (stiff,) = separations(
-        PLANT, (rival("leak", regulator__leak=0.01), fixed), inputs_of(plan), loud
-    )
-    (free,) = separations(PLANT, (little, more), inputs_of(plan), loud)
+    shut, loud = bound("valve_shut"), 1e-3 * NOISE
+    (stiff,) = separations(shut, (rival("leak", regulator__leak=0.01), fixed), loud)
+    (free,) = separations(shut, (little, more), loud)
     assert stiff > 10.0
     assert free < 1e-3 * stiff
 
@@ -161,9 +163,8 @@ def test_nearest_rival_decides():
     alone = [proposed(leak, other)["separation"] for other in (creep, late)]
     assert both["separation"] <= min(alone)
     assert both["between"] == ["leak", "creep", "dead_time"]
-    plan = next(p for p in plans(ABLE) if p.name == both["name"])
     assert both["separation"] == pytest.approx(
-        min(separations(PLANT, (leak, creep, late), inputs_of(plan), NOISE))
+        min(separations(bound(both["name"]), (leak, creep, late), NOISE))
     )
 
 
@@ -181,7 +182,7 @@ def test_inseparable_rivals_are_reported():
 
 
 def test_rival_has_perturbed_own_parameters():
-    family = MuscleFamily(PLANT, inputs_of(plans(POOR)[0]))
+    family = MuscleFamily(PLANT, planned_inputs(plans(POOR)[0]))
     base = family.free("regulator.gain")
     own = (
         family.free("regulator.leak", start=0.01, scale=0.005),
@@ -197,7 +198,7 @@ def test_rival_has_perturbed_own_parameters():
 
 
 def test_plans_start_at_rest():
-    inputs = inputs_of(plans(ABLE)[0], 0.005)
+    inputs = planned_inputs(plans(ABLE)[0], 0.005)
     assert inputs.longest_step == 0.005
     assert inputs.fresh.tolist()[:2] == [True, False]
     assert inputs.command[0] == 0.0
