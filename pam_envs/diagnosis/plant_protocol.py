@@ -95,6 +95,13 @@ class Loop:
     reference: str | None = None
 
 
+class Simulated(Protocol):
+    """A plant with given inputs."""
+
+    def simulate(self, columns: Array) -> Array:
+        """Return sensor readings for parameter columns (n, p), shape (channels, T, n)."""
+
+
 @dataclass(frozen=True)
 class Experiment:
     """Experiment that a rig can do.
@@ -113,14 +120,7 @@ class Experiment:
     name: str
     description: str
     segments: Sequence[Mapping[str, Any]]
-    bound: "Simulated"
-
-
-class Simulated(Protocol):
-    """A plant with given inputs."""
-
-    def simulate(self, columns: Array) -> Array:
-        """Return sensor readings for parameter columns (n, p), shape (channels, T, n)."""
+    bound: Simulated
 
 
 class Parameter(Protocol):

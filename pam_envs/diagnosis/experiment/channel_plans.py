@@ -141,7 +141,7 @@ class ChannelMeans:
 
 def span(joint: Mapping[str, Array]) -> tuple[float, float]:
     """Return the smallest and the largest pressure [Pa] that each muscle of a joint had."""
-    least = max(float(v.min()) for v in joint.values())
+    least = max(0.0, *(float(v.min()) for v in joint.values()))
     return least, max(least, min(float(v.max()) for v in joint.values()))
 
 
@@ -171,7 +171,8 @@ def _of_pairs(means: ChannelMeans) -> Iterator[ChannelPlan]:
             for k in joints if len(joints) > 1 and name in ALONE else ():
                 alone = f"{together} of joint {k} alone{at}"
                 yield ChannelPlan(f"{name}_joint_{k}", alone, pieces, (means.apart(USUAL, k),))
-        equal = f"keep the pressures of each pair equal: {words}"
+        both = "the two pressures of each joint" if len(joints) > 1 else "both pressures"
+        equal = f"keep {both} equal: {words}"
         yield ChannelPlan(f"{name}_equal", equal, pieces, (means.equal(),))
     slow = (REST, *TRIANGLE)
     two = f"{means.mean_bar(LOW)} bar, then {means.mean_bar(HIGH)} bar"

@@ -1,5 +1,7 @@
 """Design of the next experiment of rigs with several channels."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -105,6 +107,39 @@ def test_pressures_are_within_the_recorded_ones(name):
         assert sum(s["seconds"] for s in plan.segments) == pytest.approx(
             plan.bound.drives.shape[1] * PERIOD
         )
+
+
+@needs_kernels
+@pytest.mark.parametrize("name", ["elbow_orthosis", "knee_orthosis"])
+def test_plans_have_the_fitted_plant_and_clock(name):
+    """The friction of the fitted plant may have the other drive."""
+    case = Case(name)
+    case.family = dataclasses.replace(case.family, plant=case.kind.rival(case.plant), clock=0.07)
+    for plan in case.experiments():
+        assert plan.bound.plant == case.family.plant
+        assert plan.bound.clock == 0.07
+    early = np.array([case.family.column])
+    early[0, -1] = -0.05
+    late, soon = plan.bound.simulate(np.array([case.family.column, early[0]])).transpose(2, 0, 1)
+    assert np.isfinite(late).all()
+    assert np.abs(late - soon).max() > 0.0
+
+
+def test_measured_pressures_limit_experiments_of_a_recording_without_commands():
+    case = Case(JOINT)
+    inputs = dict(case.recording.inputs)
+    read = {"angle": np.zeros(len(case.recording.time))}
+    read |= {f"pressure_{s}": inputs.pop(f"set_point_{s}") - 0.6 * BAR for s in "ab"}
+    case.recording = Recording.of_channels(
+        case.recording.time, inputs, read, plant=JOINT, segment=["all"] * len(read["angle"])
+    )
+    case.family = case.kind.bind(case.plant, case.recording, case.sheet)
+    assert case.family.measured_drive
+    for plan in case.experiments():
+        values = np.array(list(setpoints(plan.segments).values()))
+        assert values.min() >= 0.0
+        assert values.max() <= max(v.max() for n, v in read.items() if n != "angle") / BAR + 1e-4
+        assert plan.bound.plant == case.family.plant
 
 
 def test_payloads_are_recorded_ones():
