@@ -84,12 +84,14 @@ def promised(record: dict[str, Any]) -> bool:
 def needs_oracle(record: dict[str, Any]) -> bool:
     """Return whether a record names other causes than an oracle may, which knows the hidden ones.
 
-    With the same names the oracle is the same model.
+    With the same names the oracle is the same model. There is none where the catalogue has no cause
+    of the hidden effect.
     """
+    known = record["case"]["kind"] != "unknown"
     hidden = set(record["case"]["names"])
     others = set(record.get("names", ())) - {*hidden, *COMMON}
     missing = hidden - set(record.get("names", ()))
-    return bool(hidden and record.get("verdict") == "named" and (others or missing))
+    return bool(hidden and known and record.get("verdict") == "named" and (others or missing))
 
 
 def truths_of(case: Case, made: Made) -> list[dict[str, Any]]:

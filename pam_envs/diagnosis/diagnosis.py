@@ -19,10 +19,13 @@ from pam_envs.diagnosis.causes import selected
 from pam_envs.diagnosis.closed_loop import gain as loops
 from pam_envs.diagnosis.closed_loop import in_environment
 from pam_envs.diagnosis.decide import isolability as iso
+from pam_envs.diagnosis.decide.compare import p_value, possible_gain
 from pam_envs.diagnosis.decide.flexible_base import FlexibleBase, shapes_of
 from pam_envs.diagnosis.decide.held_out import HeldOut, choose, compared, hold_out, interleaved
 from pam_envs.diagnosis.decide.isolability import base_subspace, not_testable, unseen_rivals
 from pam_envs.diagnosis.decide.rule import Rule
+from pam_envs.diagnosis.decide.screen import Screen
+from pam_envs.diagnosis.decide.search import search
 from pam_envs.diagnosis.decide.structure import Regressors
 from pam_envs.diagnosis.decide.verdict import Decision, decide, effect_traces
 from pam_envs.diagnosis.experiment.experiment import propose, rival_of
@@ -190,6 +193,8 @@ def acting(causes: Sequence[Cause], plant: Any) -> tuple[list[Cause], list[str]]
     return [c for c in made if c.forms], [c.name for c in made if not c.forms]
 
 
+LITTLE_LEFT = 0.25
+"""Gain of a model that leaves only noise below which no other friction is tried."""
 EXCHANGE = (0.06, 0.6)
 """Seconds before and after a change of the load that are not compared: a recording does not show
 how the load was exchanged."""
@@ -233,12 +238,14 @@ class Study:
     driving: tuple[str, Array] | None = None  # label and values of the signal that drives loops
     rule: Rule = field(default_factory=Rule)
     seed: int = 0
-    causes: list[Cause] = field(default_factory=list)
+    asked: list[Cause] = field(default_factory=list)
+    causes: list[Cause] = field(default_factory=list)  # those that the recording can show
     not_testable: dict[str, str] = field(default_factory=dict)
     unseen: list[Cause] = field(default_factory=list)  # causes that lack their experiment
     isolability: iso.Isolability | None = None
     short: str = ""
     decision: Decision | None = None
+    reference: Candidate | None = None  # a better base, if the decision's has other friction
     held: HeldOut | None = None
     compared: HeldOut | None = None
     proposal: dict[str, Any] | None = None
@@ -337,10 +344,12 @@ class Study:
         """Selection of the differences in which rigs commonly depart from the base."""
         data = (self.problem, self.family, self.blocks, self.base, self.rule)
         made = self.fitted
-        return FlexibleBase(*data, made.guesses, made.rate, made.linear, made.begins)
+        starts = made.guesses, made.rate, made.linear, made.begins, made.others
+        return FlexibleBase(*data, *starts)
 
     def make_flexible(self, causes: Sequence[Cause]) -> None:
         """Add the common differences that the recording needs to the base."""
+        self.asked = list(causes)
         self.normal = self.flexible.select(causes)
 
     def find_testable(self, causes: Sequence[Cause], absent: Sequence[str] = ()) -> None:
@@ -351,8 +360,7 @@ class Study:
         self.isolability, self.not_testable = not_testable(*data, unmet)
         self.not_testable |= dict.fromkeys(absent, "this plant has no parameter of it")
         self.not_testable |= dict.fromkeys(replaced, ORIFICES_REPLACE)
-        common = {cause.name for cause, _ in self.normal.causes}
-        self.causes = [c for c in causes if c.name not in {*self.not_testable, *common}]
+        self.causes = [c for c in causes if c.name not in self.not_testable]
         self.unseen = unseen_rivals(*data, unmet)
 
     def recheck_loads(self) -> None:
@@ -369,8 +377,11 @@ class Study:
             data = (self.problem, self.blocks, self.family)
             self.base = tolerance.refit_load(*data, self.base, limit)
             self.normal = tolerance.refit_load(*data, self.normal, limit)
+            if self.reference is not None:
+                self.reference = tolerance.refit_load(*data, self.reference, limit)
             self.causes = [c for c in self.causes if c.name != tolerance.PAYLOAD_ERROR]
-            self.decide()
+            self.decision = self.decided(self.normal, self.reference)
+            self.finish()
 
     def decide(self) -> None:
         """Compare rival causes."""
@@ -378,25 +389,81 @@ class Study:
         moved = int(np.sum(self.blocks.held_out & (moving > 0.0)))
         if moved < self.rule.least_blocks:
             self.short = iso.shortness_warning(moved, self.rule.least_blocks)
-        if self.short or iso.too_few_testable(
-            len(self.causes), len(self.causes) + len(self.not_testable)
-        ):
+        testable = len(self.beside(self.normal))
+        if self.short or iso.too_few_testable(testable, testable + len(self.not_testable)):
             self.decision = Decision("insufficient", self.normal)
             return
-        self.decision = decide(
+        self.decision = self.decided(self.normal)
+        if possible_gain(self.blocks, self.model) > LITTLE_LEFT or self.decision.level > 1:
+            self.try_other_friction()
+        self.finish()
+
+    def finish(self) -> None:
+        """Drop the common differences that the model of the decision does not need."""
+        assert self.decision is not None
+        if self.decision.level and any(cause.common for cause, _ in self.model.causes):
+            self.decision.model = self.flexible.needed(self.decision.model)
+
+    def beside(self, base: Candidate) -> list[Cause]:
+        """Return the causes that the recording can show beside the differences of a base."""
+        return [cause for cause in self.causes if cause.name not in base.names]
+
+    def decided(self, base: Candidate, reference: Candidate | None = None) -> Decision:
+        """Return the decision on a base; causes must gain over a reference too."""
+        return decide(
             self.problem,
             self.family,
             self.blocks,
-            self.normal,
-            self.causes,
+            base,
+            self.beside(base),
             self.regressors,
             self.rule,
             self.seed,
             self.unseen,
             self.base,
+            reference,
         )
-        if self.decision.level and any(cause.common for cause, _ in self.model.causes):
-            self.decision.model = self.flexible.needed(self.decision.model)
+
+    def try_other_friction(self) -> None:
+        """Repeat the decision on a base with friction of one kind, and keep it if it is better.
+
+        The base is selected as if no other cause acted, and may hold friction that imitates one.
+        """
+        best, tried = self.normal, []
+        for other in self.flexible.alternatives(self.asked, best):
+            if self.blocks.gain(best.errors, other.errors) > 0.0:
+                best = other
+            causes = self.beside(other)
+            data = (self.problem, self.family, self.blocks, other, causes)
+            screen = Screen.make(self.problem, self.family, other.fit, causes)
+            models = [other, *search(*data, screen)]
+            tried.append((other, max(models, key=self.ahead)))
+        if not tried:
+            return
+        other, model = max(tried, key=lambda pair: self.ahead(pair[1]))
+        if self.is_better(other, model, len(tried), self.rule.hint):
+            found = self.decided(other, best)
+            if self.is_better(other, found.model, len(tried)):
+                self.normal, self.reference, self.decision = other, best, found
+
+    def ahead(self, model: Candidate) -> float:
+        """Return the gain of a model over that of the decision."""
+        return self.blocks.gain(self.model.errors, model.errors)
+
+    def is_better(
+        self, base: Candidate, model: Candidate, tried: int, share: float = 1.0
+    ) -> bool:
+        """Return whether a model on another base, one of ``tried``, replaces the decision's.
+
+        ``share`` of the gain that this needs is enough of one that is not fitted to the end.
+        """
+        assert self.decision is not None
+        fewer = len(model.causes) - len(base.causes) < self.decision.level
+        if fewer:
+            return self.ahead(model) > -self.rule.simpler
+        data = (self.problem, self.blocks, self.model, model)
+        clear = self.ahead(model) >= share * self.rule.differing_gain
+        return clear and p_value(*data, tried) <= self.rule.doubt
 
     def hold_out(self) -> None:
         """Fit base, model and rivals without the held-out data."""

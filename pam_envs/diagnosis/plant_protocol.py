@@ -206,6 +206,10 @@ class Fitted(Protocol):
     def begins(self) -> Sequence[str]:
         """Parameters of the start of the recording, which are fitted beside the differences."""
 
+    @property
+    def others(self) -> Sequence[Mapping[str, float]]:
+        """Starting values by parameter with friction of one kind alone."""
+
 
 class Kind(Protocol):
     """A plant that can be diagnosed, before a recording is given."""

@@ -51,6 +51,8 @@ SPARSE_ROUNDS, SPARSE_LOSS = 4, 0.02
 """Rounds of a fit without the others, and the gain that it may lose."""
 STARTS = 2
 """Number of starting values of each difference."""
+FAR = 2.0
+"""Gain of the base over one with other friction from which the other is given up."""
 NOTHING = 1e-3
 """Mean square over the noise below which a difference changes nothing: a gain of about 0.001."""
 
@@ -114,6 +116,8 @@ class FlexibleBase:
     # whether a linear model may show that a difference is needed, without a refit
     linear: bool = True
     begins: Sequence[str] = ()  # parameters of the start of the recording
+    # starting values with friction of one kind alone
+    others: Sequence[Mapping[str, float]] = ()
 
     def chosen(self, causes: Sequence[Cause]) -> list[tuple[Cause, Form]]:
         """Return the common differences that the base lacks, each in the form of all its forms.
@@ -131,11 +135,31 @@ class FlexibleBase:
                 made.append((cause, form))
         return made
 
-    def fitted(self, causes: Sequence[tuple[Cause, Form]]) -> Candidate:
+    def alternatives(self, causes: Sequence[Cause], normal: Candidate) -> Iterator[Candidate]:
+        """Yield bases with friction of one kind alone, unless they are far worse than ``normal``.
+
+        An effect that is no common difference may have led the selection to another friction.
+        """
+        chosen = self.chosen([c for c in causes if c.common])
+        for guess in self.others:
+            alone = []
+            for cause, form in chosen:
+                rate = form is self.rate
+                terms = tuple(t for t in form.terms if rate or t.name in guess)
+                if any(t.amount for t in terms) and (not rate or cause.name in normal.names):
+                    alone.append((cause, replace(form, terms=terms)))
+            model = replace(self, guesses=(guess,)).fitted(alone, 0)
+            if self.blocks.gain(normal.errors, model.errors) < -FAR:
+                continue
+            model = self.anchored(self.sparse(self.begun(model)))
+            complete_jacobian(self.problem, model.fit)
+            yield model
+
+    def fitted(self, causes: Sequence[tuple[Cause, Form]], starts: int = STARTS) -> Candidate:
         """Return the base extended by some causes at once, from the best of several starts."""
         plain, fits = self.base.fit, []
         begins: list[tuple[Array, int, Mapping[str, float]]]
-        begins = [(plain.z, k, {}) for k in range(STARTS)]
+        begins = [(plain.z, k, {}) for k in range(starts)]
         for guess in self.guesses:
             guessed = [f.inner(f.within(guess.get(f.name, f.start))) for f in plain.frees]
             begins.append((np.array(guessed), 0, {**self.absent(causes), **guess}))

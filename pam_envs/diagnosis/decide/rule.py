@@ -14,7 +14,7 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "11"  # part of every report
+    version: str = "12"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     # the same on a rig whose law or friction differs from the base, of any cause and of one that is
@@ -29,10 +29,11 @@ class Rule:
     flexible: float = 0.15
     peak: float = 30.0
     excess: float = 1.6
-    # removed share of the excess below which structure is unexplained; where this share of a
-    # spectral peak remains at its frequency, what oscillates has no name yet, and the share must be
-    # larger
-    explained: float = 0.5
+    # removed share of the excess below which structure is unexplained, and below which a name is
+    # incomplete; where this share of a spectral peak remains at its frequency, what oscillates has
+    # no name yet, and the share must be larger
+    explained: float = 0.3
+    complete: float = 0.5
     lasting: float = 0.5
     explained_with_peak: float = 0.9
     # mean square over the noise of a pressure above which a cause must explain its share there too
@@ -74,8 +75,8 @@ LITTLE = 0.3
 class Judgement:
     """A verdict on plain evidence.
 
-    Number of causes, the rivals that are not excluded, and whether a fault of the base is named
-    beside structure that no cause explains.
+    Number of causes, the rivals that are not excluded, and whether what is named leaves structure
+    that no cause explains.
     """
 
     verdict: str
@@ -105,15 +106,17 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
         if not is_accepted(levels[level + 1], required, rule):
             break
         level += 1
-    found = levels[level]
+    found, incomplete = levels[level], False
     if has_structure(found["left"], rule):
         lasts = oscillates_still(levels[0]["left"], found["left"], rule)
-        if explained_fraction(levels[0], found) < (
-            rule.explained_with_peak if lasts else rule.explained
-        ) or is_lost(levels[0], found, evidence.get("driving", ()), rule):
+        share = explained_fraction(levels[0], found)
+        if share < (rule.explained_with_peak if lasts else rule.explained) or is_lost(
+            levels[0], found, evidence.get("driving", ()), rule
+        ):
             return unexplained(evidence, level, rule)
+        incomplete = share < rule.complete
     still = not_excluded(found["rivals"], rule)
-    return Judgement("ambiguous" if still else "named", level, still)
+    return Judgement("ambiguous" if still else "named", level, still, incomplete)
 
 
 def unexplained(evidence: Mapping[str, Any], level: int, rule: Rule) -> Judgement:
@@ -133,7 +136,7 @@ def is_shown(fault: Mapping[str, Any], rule: Rule) -> bool:
         fault["gain"] >= rule.lawlike_further
         and fault["unsure"] <= rule.doubt
         and explained_fraction({"left": fault["without"]}, {"left": fault["left"]})
-        >= rule.explained
+        >= rule.complete
         and fault["rival"] < rule.close * fault["gain"]
     )
 
@@ -196,7 +199,7 @@ def is_lost(
     """
     pairs = [(level["left"]["by_channel"][k] for level in (before, after)) for k in driving]
     return any(
-        now > rule.lost and now - 1.0 > (1.0 - rule.explained) * (was - 1.0) for was, now in pairs
+        now > rule.lost and now - 1.0 > (1.0 - rule.complete) * (was - 1.0) for was, now in pairs
     )
 
 

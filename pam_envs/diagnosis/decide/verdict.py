@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ class Decision:
     open_rivals: list[Candidate] = field(default_factory=list)  # those that are not excluded
     evidence: dict[str, Any] = field(default_factory=dict)  # see Ladder.evidence
     level: int = 0  # number of causes beside the differences of the base
-    incomplete: bool = False  # whether a named fault leaves structure that no cause explains
+    incomplete: bool = False  # whether what is named leaves structure that no cause explains
 
 
 def remaining_structure(
@@ -83,6 +84,15 @@ class Ladder:
     screen: Screen
     seed: int = 0
     unseen: frozenset[str] = frozenset()  # causes that may be rivals, but cannot be named
+    # a better base with other friction, over which gains are judged
+    reference: Candidate | None = None
+
+    @cached_property
+    def handicap(self) -> float:
+        """Gain of the reference over the base, by which gains over the base are reduced."""
+        if self.reference is None:
+            return 0.0
+        return max(0.0, self.blocks.gain(self.base.errors, self.reference.errors))
 
     def named_first(self, rivals: list[Candidate]) -> list[Candidate]:
         """Return models, the best one that may be named first."""
@@ -92,10 +102,10 @@ class Ladder:
         return [best, *(r for r in rivals if r is not best)]
 
     def gain(self, model: Candidate, base: Candidate | None = None) -> float:
-        """Return the penalised gain of a model over another one (default: the base)."""
-        return compare.penalised_gain(
-            self.blocks, self.base if base is None else base, model, self.rule
-        )
+        """Return the penalised gain of a model over another one (default: base or reference)."""
+        if base is None:
+            return compare.penalised_gain(self.blocks, self.base, model, self.rule) - self.handicap
+        return compare.penalised_gain(self.blocks, base, model, self.rule)
 
     def level(self, model: Candidate, rivals: list[Candidate]) -> Level:
         """Return a level with the remaining structure of its model."""
@@ -177,12 +187,11 @@ class Ladder:
     def faults(self, plain: Candidate) -> list[dict[str, Any]]:
         """Return the evidence on each common difference of the base that is a fault.
 
-        A difference by nature is none, nor one that is like another law. ``plain`` is the base
-        without differences. For each fault: its ``name``, its ``gain``, the p-value (``unsure``)
+        One that is like another law is none. ``plain`` is the base without differences. For each fault: its ``name``, its ``gain``, the p-value (``unsure``)
         and the mean squares by channel of a base refitted without it (``without``) and of the base
         (``left``), and the gain of the best other cause in its place (``rival``).
         """
-        names = {c.name for c, _ in self.base.causes if not (c.by_nature or c.lawlike)}
+        names = {c.name for c, _ in self.base.causes if not c.lawlike}
         smaller = without_each_cause(self.problem, self.blocks, plain, self.base, names)
         made = []
         for name, less in smaller.items():
@@ -229,8 +238,8 @@ class Ladder:
             lawlike = bool(further) and all(c.lawlike for c in further)
             made.append(
                 {
-                    "gain": self.gain(level.model),
-                    "added": self.gain(level.model, before),
+                    "gain": self.gain(level.model) if k else 0.0,
+                    "added": self.gain(level.model, before) - (self.handicap if k == 1 else 0.0),
                     "possible": compare.possible_gain(self.blocks, before),
                     "unsure": compare.p_value(
                         self.problem, self.blocks, before, level.model, len(level.rivals)
@@ -262,7 +271,7 @@ class Ladder:
         return {
             "names": list(rival.names),
             "forms": [form.name for _, form in rival.causes],
-            "gain": compare.penalised_gain(blocks, base, rival, self.rule),
+            "gain": compare.penalised_gain(blocks, base, rival, self.rule) - self.handicap,
             "better": compare.share_ahead(blocks, rival, best, draws),
             "imitates": compare.imitates(rival, best),
             "out": False,
@@ -295,7 +304,8 @@ class Ladder:
             "rivals": rows + excluded,
             "crossed": len(rows),
             "gain": rows[0]["gain"],
-            "added": compare.penalised_gain(every, before, order[0], self.rule),
+            "added": compare.penalised_gain(every, before, order[0], self.rule)
+            - (self.handicap if judged.level == 1 else 0.0),
             "unsure": compare.p_value(self.problem, self.blocks, smaller, best, len(level.rivals)),
         }
         if best is not level.model:
@@ -315,11 +325,13 @@ def decide(
     seed: int = 0,
     unseen: Sequence[Cause] = (),
     plain: Candidate | None = None,
+    reference: Candidate | None = None,
 ) -> Decision:
     """Search for causes, add further ones while they are accepted, and give the verdict.
 
     ``unseen`` are causes that lack their experiment: rivals that are never named. ``plain`` is the
-    base without the common differences, if it has any.
+    base without the common differences, if it has any. ``reference`` is a base with other
+    friction, over which a cause must gain too.
     """
     ladder = Ladder(
         problem,
@@ -332,8 +344,11 @@ def decide(
         Screen.make(problem, family, base.fit, [*causes, *unseen]),
         seed,
         frozenset(cause.name for cause in unseen),
+        reference,
     )
-    levels = [ladder.level(base, []), *(ladder.level(*models) for models in ladder.models())]
+    better = base if reference is None or ladder.handicap == 0.0 else reference
+    bottom = replace(ladder.level(better, []), model=base)
+    levels = [bottom, *(ladder.level(*models) for models in ladder.models())]
     evidence = ladder.evidence(levels)
     judged = judge(evidence, rule)
     if judged.verdict == "ambiguous":

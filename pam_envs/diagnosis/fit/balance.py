@@ -41,6 +41,8 @@ BRAIDS = (0.008, 0.015, 0.06)
 """Tried strains over which the resistance of the braid falls."""
 BREAKS_IN_PRESSURE = (1e4, 2e4, 4e4, 1e5)
 """Tried pressures over which friction of the pressure yields [Pa]."""
+KINDS = "strands", "length", "pressure"
+"""Kinds of friction."""
 RATIOS, RATIOS_NEAR = (0.0, 1.0), (0.0, 0.5, 1.0)
 """Tried ratios of yielding elements, from springs back to the friction of Dahl."""
 LEAST_GAIN = 0.03
@@ -211,8 +213,8 @@ class Balance:
         chosen = self._chosen(nearer) if nearer else []
         return self._regressed(chosen), chosen
 
-    def _chosen(self, tried: Iterable[Friction]) -> list[Friction]:
-        """Return the friction that reduces the error, at most one of each kind."""
+    def _chosen(self, tried: Iterable[Friction], gain: float = LEAST_GAIN) -> list[Friction]:
+        """Return the friction that reduces the error by ``gain``, at most one of each kind."""
         tried = list(tried)
         regression, first = self._whole(tried)
         ends = np.cumsum([first, *(len(f.columns) for f in tried)])
@@ -228,7 +230,7 @@ class Balance:
             used = {tried[k].kind for k in chosen}
             errors = {k: error([*chosen, k]) for k, f in enumerate(tried) if f.kind not in used}
             least = min(errors, key=lambda k: errors[k], default=None)
-            if least is None or errors[least] > (1.0 - LEAST_GAIN) * best:
+            if least is None or errors[least] > (1.0 - gain) * best:
                 return [tried[k] for k in chosen]
             chosen.append(least)
             best = errors[least]
@@ -286,7 +288,21 @@ class Balance:
 
     def flexible(self) -> dict[str, float]:
         """Return coefficients with the map and with further friction."""
-        solved, frictions = self._finer
+        return self._with(*self._finer)
+
+    def others(self) -> list[dict[str, float]]:
+        """Return coefficients with friction of each kind alone, unless that is the chosen one."""
+        made, best = [], [friction.kind for friction in self._finer[1]]
+        for kind in KINDS:
+            if best == [kind]:
+                continue
+            chosen = self._chosen((f for f in self._frictions() if f.kind == kind), 0.0)
+            chosen = self._chosen((n for f in chosen for n in self._near(f)), 0.0)
+            made.append(self._with(self._regressed(chosen), chosen))
+        return made
+
+    def _with(self, solved: Solution, frictions: list[Friction]) -> dict[str, float]:
+        """Return the coefficients of a solution with some friction."""
         c, first = solved.coefficients, len(LAW) + len(self.gaps) + 2
         found = self._named(c[:first])
         at = first + len(MAP_SIZES)

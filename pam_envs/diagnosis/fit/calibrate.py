@@ -63,6 +63,8 @@ class Calibration:
     linear: bool = True
     # parameters of the start of the recording, which are fitted beside the differences
     begins: tuple[str, ...] = ()
+    # starting values with friction of one kind alone
+    others: tuple[Mapping[str, float], ...] = ()
 
 
 def calibrate(
@@ -122,18 +124,19 @@ def calibrate(
     tried: list[tuple[Free, ...]] = [frees]
     law: dict[str, float] = {}
     wide: dict[str, float] = {}
+    others: list[dict[str, float]] = []
     if moved:
         pressure = family.simulate(column[None])[1, :, 0]
         balance = Balance.of(family, measured[0], pressure, noise[0])
         if balance is not None:
             balance = balance.with_best_braid()
-            law, wide = balance.solve(), balance.flexible()
+            law, wide, others = balance.solve(), balance.flexible(), balance.others()
             law[DAMPING] = best_damping(problem, column_with(family, found | law | wide), family)
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column
     best = fit_base(problem, blocks, plain, tried, ROUNDS)
-    return Calibration(family, problem, best, (found | law | wide,), rate, begins=(START,))
+    return Calibration(family, problem, best, (found | law | wide,), rate, begins=(START,), others=tuple(found | law | other for other in others))
 
 
 def smoothed(pressure: Array, time: Array) -> Array:
@@ -180,6 +183,8 @@ TAIL_FREQUENCIES, TAIL_FASTEST = (0.6, 1.0), 2.0
 """Frequencies [Hz] at which a fit of that share starts, and the largest one."""
 TAIL_GAIN = 0.3
 """Gain that it needs."""
+DELAY = 0.02
+"""Dead time [s] at which a fit starts."""
 CONDUCTANCES = (1e-10, 8e-10)
 """Conductances [m3/(s Pa)] at which a fit starts."""
 
@@ -274,7 +279,7 @@ def orifices(
     fits = []
     for size, source in product(CONDUCTANCES, (1.05 * full, 1.5 * full)):
         begin = {"regulator.conductance": size, "regulator.source_pressure": source}
-        frees = start_at_guess(regulator_of(other), begin)
+        frees = (*start_at_guess(regulator_of(other), begin), *delay_of(other))
         fits += [Fit.at_start(frees, column) for column in columns]
     only = dataclasses.replace(of_pressure(problem), simulate=other.simulate, tie=other.tie)
     flow = simplest(only, blocks, promising(only, fits), FLOW_ROUNDS)
@@ -284,15 +289,25 @@ def orifices(
     return None if gain_of(only, blocks, uneven, flow) < FLOW_GAIN else (other, flow)
 
 
+def delay_of(family: MuscleFamily) -> tuple[Free, ...]:
+    """Return the dead time where the base holds it.
+
+    A dead time makes the better of two kinds of regulator look like the worse.
+    """
+    name = "regulator.dead_time"
+    known = any(free.name == name for free in family.base())
+    return () if known else (family.free(name, start=DELAY),)
+
+
 def with_slower_exhaust(problem: Problem, family: MuscleFamily, blocks: Blocks, fit: Fit) -> Fit:
     """Return the fit of a regulator whose exhaust is slower or faster than its filling.
 
     Orifices also have an exhaust unlike the filling, which alone does not show them.
     """
     taper = family.free("regulator.exhaust_taper", start=0.3, scale=0.5)
-    fits = []
+    more, fits = (taper, *delay_of(family)), []
     for ratio in (0.7, 1.5):
-        frees = (family.free("regulator.exhaust_ratio", start=ratio, log=True), taper)
+        frees = (family.free("regulator.exhaust_ratio", start=ratio, log=True), *more)
         z = np.concatenate([fit.z, [f.inner(f.start) for f in frees]])
         fits.append(restarted(fit, frees=(*fit.frees, *frees), z=z, shared=None))
     evaluate(problem, fits)
