@@ -450,9 +450,7 @@ class Study:
         """Return the gain of a model over that of the decision."""
         return self.blocks.gain(self.model.errors, model.errors)
 
-    def is_better(
-        self, base: Candidate, model: Candidate, tried: int, share: float = 1.0
-    ) -> bool:
+    def is_better(self, base: Candidate, model: Candidate, tried: int, share: float = 1.0) -> bool:
         """Return whether a model on another base, one of ``tried``, replaces the decision's.
 
         ``share`` of the gain that this needs is enough of one that is not fitted to the end.

@@ -135,8 +135,7 @@ def is_shown(fault: Mapping[str, Any], rule: Rule) -> bool:
     return bool(
         fault["gain"] >= rule.lawlike_further
         and fault["unsure"] <= rule.doubt
-        and explained_fraction({"left": fault["without"]}, {"left": fault["left"]})
-        >= rule.complete
+        and explained_fraction({"left": fault["without"]}, {"left": fault["left"]}) >= rule.complete
         and fault["rival"] < rule.close * fault["gain"]
     )
 

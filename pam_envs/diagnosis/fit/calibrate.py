@@ -136,7 +136,15 @@ def calibrate(
         tried = [guess, frees] if law else [guess]
     plain = family.column
     best = fit_base(problem, blocks, plain, tried, ROUNDS)
-    return Calibration(family, problem, best, (found | law | wide,), rate, begins=(START,), others=tuple(found | law | other for other in others))
+    return Calibration(
+        family,
+        problem,
+        best,
+        (found | law | wide,),
+        rate,
+        begins=(START,),
+        others=tuple(found | law | other for other in others),
+    )
 
 
 def smoothed(pressure: Array, time: Array) -> Array:

@@ -175,10 +175,14 @@ def test_a_cause_that_leaves_the_pressure_unexplained_is_not_named(was, now, ver
     assert judge(found, RULE).verdict == "named"
 
 
-@pytest.mark.parametrize(("after", "verdict"), [(2.0, "named"), (6.0, "unexplained")])
-def test_remaining_structure_decides_between_named_and_unexplained(after, verdict):
+@pytest.mark.parametrize(
+    ("after", "verdict", "incomplete"),
+    [(2.0, "named", False), (6.0, "named", True), (7.6, "unexplained", False)],
+)
+def test_remaining_structure_decides_between_named_and_unexplained(after, verdict, incomplete):
     found = evidence(level(1.0, LEAK, left=left(excess=after)), before=left(excess=10.0))
-    assert judge(found, RULE).verdict == verdict
+    judged = judge(found, RULE)
+    assert (judged.verdict, judged.incomplete) == (verdict, incomplete)
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,23 @@ def test_it_finds_friction_of_each_kind(
     assert np.std(moved) < 2.0 * NOISE  # plays may take a part of the friction, and the law of it
 
 
+def test_other_friction_is_of_one_kind(family: MuscleFamily) -> None:
+    made = balance(family, muscle__yield_force=8.0, muscle__yield_break=0.03)
+    prefixes = {
+        "strands": "muscle.strand_",
+        "length": "muscle.yield_",
+        "pressure": "hysteresis.yield_",
+    }
+    chosen = [friction.kind for friction in made._finer[1]]
+    found = [
+        {kind for kind, prefix in prefixes.items() if any(n.startswith(prefix) for n in other)}
+        for other in made.others()
+    ]
+    left = [kind for kind in prefixes if chosen != [kind]]
+    assert len(found) == len(left) >= 2
+    assert all(kinds <= {kind} for kinds, kind in zip(found, left, strict=True))
+
+
 def plant_force(family: MuscleFamily, made: Balance) -> Array:
     """Return the force of the plant's static law at the samples of a balance [N]."""
     return np.asarray(family.plant.muscle.tension(made.pressure, made.strain))
