@@ -39,7 +39,7 @@ def seen(study: Any) -> list[tuple[int, str]]:
 
 
 def causes(study: Any) -> list[Json]:
-    """Return the causes of the extended plant in the order of evidence, differences by nature last.
+    """Return the causes of the extended plant in the order of evidence, common differences last.
 
     A muscle of another make has another law and another friction; they are no fault.
     """
@@ -81,8 +81,8 @@ def causes(study: Any) -> list[Json]:
                 "size": size_over_noise(left, problem),
             }
         )
-    natural = {cause.name: cause.by_nature for cause, _ in model.causes}
-    return sorted(made, key=lambda c: (natural[c["name"]], -c["gain"]["value"]))
+    common = {c.name: (c.by_nature, c.common and c.lawlike) for c, _ in model.causes}
+    return sorted(made, key=lambda c: (common[c["name"]], -c["gain"]["value"]))
 
 
 def calibration(study: Any) -> list[Json]:
