@@ -191,8 +191,8 @@ TAIL_FREQUENCIES, TAIL_FASTEST = (0.6, 1.0), 2.0
 """Frequencies [Hz] at which a fit of that share starts, and the largest one."""
 TAIL_GAIN = 0.3
 """Gain that it needs."""
-DELAY = 0.02
-"""Dead time [s] at which a fit starts."""
+DELAY, LEAK = 0.02, 0.005
+"""Dead time [s] and leak [1/s] at which a fit starts."""
 CONDUCTANCES = (1e-10, 8e-10)
 """Conductances [m3/(s Pa)] at which a fit starts."""
 
@@ -204,7 +204,7 @@ def regulator(
 
     First order or with a pilot stage, either with or without a limit of its rate (``rates``).
     """
-    lag = regulator_of(family)
+    lag = (*regulator_of(family), *leak_of(family))
     known = {f.name for f in lag}
     second = (*lag, *(family.free(name, start=start) for name, start in PILOT.items()))
     flows = family.plant.air == "flow"
@@ -287,7 +287,7 @@ def orifices(
     fits = []
     for size, source in product(CONDUCTANCES, (1.05 * full, 1.5 * full)):
         begin = {"regulator.conductance": size, "regulator.source_pressure": source}
-        frees = (*start_at_guess(regulator_of(other), begin), *delay_of(other))
+        frees = start_at_guess((*regulator_of(other), *delay_of(other), *leak_of(other)), begin)
         fits += [Fit.at_start(frees, column) for column in columns]
     only = dataclasses.replace(of_pressure(problem), simulate=other.simulate, tie=other.tie)
     flow = simplest(only, blocks, promising(only, fits), FLOW_ROUNDS)
@@ -305,6 +305,18 @@ def delay_of(family: MuscleFamily) -> tuple[Free, ...]:
     name = "regulator.dead_time"
     known = any(free.name == name for free in family.base())
     return () if known else (family.free(name, start=DELAY),)
+
+
+def leak_of(family: MuscleFamily) -> tuple[Free, ...]:
+    """Return the leak where the valve is shut in some samples, and the base does not hold it.
+
+    The fall of the pressure behind a shut valve says nothing on the kind of regulator.
+    """
+    name = "regulator.leak"
+    known = any(free.name == name for free in family.base())
+    if known or not np.any(family.inputs.command < 0.0):
+        return ()
+    return (family.free(name, start=LEAK, scale=LEAK),)
 
 
 def with_slower_exhaust(problem: Problem, family: MuscleFamily, blocks: Blocks, fit: Fit) -> Fit:
