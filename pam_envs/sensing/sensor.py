@@ -23,8 +23,8 @@ class SensorEffects:
     """Effects of any sensor, neutral unless a recording shows them.
 
     A reading is ``x + (bow + wave (2 u - 1)) x (u - 1) + drift + cycle + ramp + slip``,
-    ``u = x / full``, of the quantity ``x`` that the sensor measured ``delay`` seconds ago. ``quantity`` is its unit
-    and the largest drift, ramp and slip.
+    ``u = x / full``, of the quantity ``x`` that the sensor measured ``delay`` seconds ago.
+    ``quantity`` is its unit and the largest drift, cycle, ramp and slip.
     """
 
     quantity: ClassVar[tuple[str, float]] = ("1", 1.0)

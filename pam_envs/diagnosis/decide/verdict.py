@@ -187,9 +187,10 @@ class Ladder:
     def faults(self, plain: Candidate) -> list[dict[str, Any]]:
         """Return the evidence on each common difference of the base that is a fault.
 
-        One that is like another law is none. ``plain`` is the base without differences. For each fault: its ``name``, its ``gain``, the p-value (``unsure``)
-        and the mean squares by channel of a base refitted without it (``without``) and of the base
-        (``left``), and the gain of the best other cause in its place (``rival``).
+        One that is like another law is none. ``plain`` is the base without differences. For each
+        fault: its ``name``, its ``gain``, the p-value (``unsure``) and the mean squares by channel
+        of a base refitted without it (``without``) and of the base (``left``), and the gain of the
+        best other cause in its place (``rival``).
         """
         names = {c.name for c, _ in self.base.causes if not c.lawlike}
         smaller = without_each_cause(self.problem, self.blocks, plain, self.base, names)
