@@ -20,7 +20,7 @@ class Rule:
     # the same on a rig whose law or friction differs from the base, of any cause and of one that is
     # like another law: a smaller gain may correct what is left of that difference
     differing_gain: float = 0.2
-    differing_lawlike: float = 0.4
+    differing_lawlike: float = 0.6
     trial_penalty: float = (
         0.01  # multiple-comparison penalty: gain lost for each factor e of trials
     )

@@ -256,10 +256,10 @@ def test_longer_data_lower_the_p_value():
 
 
 def test_cause_like_another_law_needs_more_where_the_base_differs() -> None:
-    """On a rig of another law a gain of 0.35 names a leak, but not a nonlinear sensor."""
+    """On a rig of another law a gain of 0.5 names a leak, but not a nonlinear sensor."""
     differs = {"differs": True}
-    weak = level(0.35, rival("leak", gain=0.35, better=1.0))
-    like = level(0.35, rival("bow", gain=0.35, better=1.0), lawlike=True)
+    weak = level(0.5, rival("leak", gain=0.5, better=1.0))
+    like = level(0.5, rival("bow", gain=0.5, better=1.0), lawlike=True)
     assert judge(evidence(weak) | differs, RULE).verdict == "named"
     assert judge(evidence(like) | differs, RULE).verdict == "adequate"
     assert judge(evidence(like), RULE).verdict == "named"
