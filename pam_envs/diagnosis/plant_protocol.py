@@ -6,7 +6,7 @@ recording, which replays parameter columns. Search, decision, held-out compariso
 figures use these two alone.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -207,8 +207,8 @@ class Fitted(Protocol):
         """Parameters of the start of the recording, which are fitted beside the differences."""
 
     @property
-    def others(self) -> Sequence[Mapping[str, float]]:
-        """Starting values by parameter with friction of one kind alone."""
+    def others(self) -> Callable[[], Sequence[Mapping[str, float]]]:
+        """Gives the starting values by parameter with friction of one kind alone."""
 
 
 class Kind(Protocol):

@@ -5,7 +5,7 @@ friction and in the order and rate of the regulator. A cause is judged by what i
 have been fitted (kennedy2001). A difference that the recording does not need is dropped again.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -116,8 +116,8 @@ class FlexibleBase:
     # whether a linear model may show that a difference is needed, without a refit
     linear: bool = True
     begins: Sequence[str] = ()  # parameters of the start of the recording
-    # starting values with friction of one kind alone
-    others: Sequence[Mapping[str, float]] = ()
+    # gives the starting values with friction of one kind alone
+    others: Callable[[], Sequence[Mapping[str, float]]] = tuple
 
     def chosen(self, causes: Sequence[Cause]) -> list[tuple[Cause, Form]]:
         """Return the common differences that the base lacks, each in the form of all its forms.
@@ -141,7 +141,7 @@ class FlexibleBase:
         An effect that is no common difference may have led the selection to another friction.
         """
         chosen = self.chosen([c for c in causes if c.common])
-        for guess in self.others:
+        for guess in self.others():
             alone = []
             for cause, form in chosen:
                 rate = form is self.rate

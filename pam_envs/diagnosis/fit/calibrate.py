@@ -1,7 +1,8 @@
 """Calibration of the plant's base parameters, so that wrong values are not taken for effects."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -63,8 +64,8 @@ class Calibration:
     linear: bool = True
     # parameters of the start of the recording, which are fitted beside the differences
     begins: tuple[str, ...] = ()
-    # starting values with friction of one kind alone
-    others: tuple[Mapping[str, float], ...] = ()
+    # gives the starting values with friction of one kind alone
+    others: Callable[[], Sequence[Mapping[str, float]]] = tuple
 
 
 def calibrate(
@@ -124,27 +125,26 @@ def calibrate(
     tried: list[tuple[Free, ...]] = [frees]
     law: dict[str, float] = {}
     wide: dict[str, float] = {}
-    others: list[dict[str, float]] = []
+    others: Callable[[], Sequence[Mapping[str, float]]] = tuple
     if moved:
         pressure = family.simulate(column[None])[1, :, 0]
         balance = Balance.of(family, measured[0], pressure, noise[0])
         if balance is not None:
             balance = balance.with_best_braid()
-            law, wide, others = balance.solve(), balance.flexible(), balance.others()
+            law, wide = balance.solve(), balance.flexible()
             law[DAMPING] = best_damping(problem, column_with(family, found | law | wide), family)
+            others = partial(with_one_friction, balance, found | law)
         guess = start_at_guess(frees, found | law)
         tried = [guess, frees] if law else [guess]
     plain = family.column
     best = fit_base(problem, blocks, plain, tried, ROUNDS)
-    return Calibration(
-        family,
-        problem,
-        best,
-        (found | law | wide,),
-        rate,
-        begins=(START,),
-        others=tuple(found | law | other for other in others),
-    )
+    guesses = (found | law | wide,)
+    return Calibration(family, problem, best, guesses, rate, begins=(START,), others=others)
+
+
+def with_one_friction(balance: Balance, found: dict[str, float]) -> list[dict[str, float]]:
+    """Return starting values with friction of one kind alone, beside those already found."""
+    return [found | other for other in balance.others()]
 
 
 def smoothed(pressure: Array, time: Array) -> Array:
@@ -298,7 +298,7 @@ def orifices(
 
 
 def delay_of(family: MuscleFamily) -> tuple[Free, ...]:
-    """Return the dead time where the base holds it.
+    """Return the dead time unless the base holds it.
 
     A dead time makes the better of two kinds of regulator look like the worse.
     """
