@@ -52,15 +52,11 @@ EVERY_EFFECT = {
     "position.delay": 0.013,
     "position.bow": 0.01,
     "position.wave": 0.01,
-    "position.cycle_sine": 2e-5,
-    "position.cycle_cosine": -3e-5,
-    "position.cycle_time": 20.0,
     "position.slip": 1e-4,
     "position.slip_at": 0.3,
     "pressure.drift": 10.0,
     "pressure.bow": 0.01,
     "pressure.wave": 0.01,
-    "pressure.cycle_cosine": 200.0,
 }
 """Every effect at once."""
 
