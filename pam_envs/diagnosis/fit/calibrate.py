@@ -302,9 +302,7 @@ def delay_of(family: MuscleFamily) -> tuple[Free, ...]:
 
     A dead time makes the better of two kinds of regulator look like the worse.
     """
-    name = "regulator.dead_time"
-    known = any(free.name == name for free in family.base())
-    return () if known else (family.free(name, start=DELAY),)
+    return unless_in_base(family, "regulator.dead_time", start=DELAY)
 
 
 def leak_of(family: MuscleFamily) -> tuple[Free, ...]:
@@ -312,11 +310,15 @@ def leak_of(family: MuscleFamily) -> tuple[Free, ...]:
 
     The fall of the pressure behind a shut valve says nothing on the kind of regulator.
     """
-    name = "regulator.leak"
-    known = any(free.name == name for free in family.base())
-    if known or not np.any(family.inputs.command < 0.0):
+    if not np.any(family.inputs.command < 0.0):
         return ()
-    return (family.free(name, start=LEAK, scale=LEAK),)
+    return unless_in_base(family, "regulator.leak", start=LEAK, scale=LEAK)
+
+
+def unless_in_base(family: MuscleFamily, name: str, **settings: float) -> tuple[Free, ...]:
+    """Return a free parameter unless the base holds it."""
+    known = any(free.name == name for free in family.base())
+    return () if known else (family.free(name, **settings),)
 
 
 def with_slower_exhaust(problem: Problem, family: MuscleFamily, blocks: Blocks, fit: Fit) -> Fit:
