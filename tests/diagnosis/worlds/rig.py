@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .law_draws import draw_law
-from .laws import LAWS, MAP_SHAPE, balance, force
+from .laws import LAWS, MAP_SHAPE, balance, draw_law, force
 from .loop_draws import DRAWS, Operator
 from .names import POSITION_NOISE, PRESSURE_NOISE, WORLDS
 from .recipes import RECIPES

@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .laws import MAP_PRESSURE, MAP_SHAPE, MAP_STRAIN, curve
+from .elements import curve
+from .fitted import MAP_PRESSURE, MAP_SHAPE, MAP_STRAIN
 
 Constants = tuple[float, ...]
 
