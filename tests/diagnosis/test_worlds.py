@@ -29,7 +29,7 @@ CAMPAIGNS = {
     "idle_high": plans.campaign_idle(1, 3.0),
 }
 READINGS = ("contraction_mm", "pressure_bar")
-LATER = WORLDS[10:]
+LATER, NEWEST = WORLDS[10:15], WORLDS[15:]
 NO_GROWTH = ("hysteresis_shape", "hysteresis_drive")  # bounded by a loop that is fully replaced
 
 
@@ -46,14 +46,17 @@ def effect_of(name: str, world: str) -> Effect:
 @pytest.mark.parametrize(
     ("name", "world"),
     [(name, WORLDS[k % 10]) for k, name in enumerate(EFFECTS)]
-    + [(name, LATER[k % 5]) for k, name in enumerate(EFFECTS)],
+    + [(name, LATER[k % 5]) for k, name in enumerate(EFFECTS)]
+    + [(name, NEWEST[k % 6]) for k, name in enumerate(EFFECTS)],
 )
 def test_effects_are_finite_visible_and_grow(name: str, world: str) -> None:
     check(name, world)
 
 
 @pytest.mark.parametrize(
-    ("name", "world"), [(name, WORLDS[-1 - k]) for k, name in enumerate(OUTSIDE)]
+    ("name", "world"),
+    [(name, WORLDS[14 - k]) for k, name in enumerate(OUTSIDE)]
+    + [(name, NEWEST[k % 6]) for k, name in enumerate(OUTSIDE)],
 )
 def test_effects_outside_the_list(name: str, world: str) -> None:
     check(name, world)

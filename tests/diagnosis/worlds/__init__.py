@@ -1,4 +1,4 @@
-"""Fifteen simulated worlds of a laboratory rig: one muscle, a hanging load, a regulator."""
+"""Twenty-one simulated worlds of a laboratory rig: one muscle, a hanging load, a regulator."""
 
 from .forms import Effect
 from .names import EFFECTS, OUTSIDE, WORLDS

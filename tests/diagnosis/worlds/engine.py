@@ -163,7 +163,7 @@ def run(
             rate = valve_rate(valve_kind, valve, p, vs, target, supply, dt)
             rate = _limit(rate, eff, valve, valve_kind, p)
             vs[0] = rate
-        if valve_kind == FLOWS[0] or valve_kind == FLOWS[1]:
+        if valve_kind == FLOWS[0] or valve_kind == FLOWS[1] or valve_kind == FLOWS[2]:
             swell = 1.0 + 4.0 * x / length
             rate = rate / swell - (p + AMBIENT) * 4.0 * v / (length * swell)
         if eff[LEAK, 0] > 0.0:

@@ -142,10 +142,13 @@ def _drive(rng: Rng, rig: Rig) -> Form:
     return Form(int(rng.integers(2)), 0.1, 1.0)
 
 
+CONTROLLED = ("integrating", "pulsed", "coarse_fine", "back_calculation", "sampled")
+
+
 def _droop(rng: Rng, rig: Rig) -> Form:
     own = 1.0, rng.uniform(4.0, 20.0), rng.uniform(5.9, 6.4)
     form = int(rng.integers(2))
-    if RECIPES[rig.world].valve in ("integrating", "pulsed"):
+    if RECIPES[rig.world].valve in CONTROLLED:
         form = 0  # a controlled valve reaches its target until the supply is too low
     return Form(form, 0.01, 0.3, own)
 

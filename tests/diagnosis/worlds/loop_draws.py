@@ -130,6 +130,50 @@ def dead_zone_play(rng: np.random.Generator, half: float, length: float) -> Oper
     return _pack("dead_zone_play", thresholds, shares / half, others)
 
 
+def slip_lag(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw uneven breakaways, and sliding that takes some hundredths of a second to settle."""
+    count = int(rng.integers(4, 7))
+    breaks = np.geomspace(0.002, rng.uniform(0.025, 0.045), count) * length
+    breaks *= rng.uniform(0.75, 1.25, count)
+    others = np.array([rng.uniform(20.0, 60.0), rng.uniform(0.01, 0.04), rng.uniform(3.0, 10.0)])
+    return _pack("slip_lag", breaks, rng.dirichlet(np.full(count, 5.0)) + 1e-3, others)
+
+
+def duhem(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw a Duhem loop that opens over another way when falling, and at another level."""
+    others = [rng.uniform(0.85, 1.15), rng.uniform(0.05, 0.25), rng.uniform(-0.2, 0.1)]
+    reach = np.array([half * rng.uniform(2.8, 3.3)])
+    return _pack("duhem", reach, np.ones(1), np.array(others))
+
+
+def elastoplastic(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw friction with a long elastic way before sliding."""
+    reach = np.array([length * rng.uniform(0.006, 0.014)])
+    return _pack("elastoplastic", reach, np.ones(1), np.array([rng.uniform(0.15, 0.45)]))
+
+
+def ridge_play(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw plays of overlapping ramps along the pressure: each part of it has its own width."""
+    centres = np.linspace(-1.2, 5.9, SIZE)
+    thresholds = half / 0.76 * rng.uniform(0.8, 1.2, SIZE)
+    shares = np.full(SIZE, 0.38 / half) * rng.uniform(0.95, 1.05, SIZE)
+    return _pack("ridge_play", thresholds, shares, centres)
+
+
+def relaxing(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw stops of which a few per cent relax within half a second."""
+    breaks = np.array([0.002, 0.005, 0.012, 0.025, 0.04]) * length * rng.uniform(0.8, 1.25, 5)
+    shares = np.array([0.15, 0.25, 0.25, 0.2, 0.15]) * rng.uniform(0.8, 1.2, 5)
+    others = np.array([rng.uniform(0.03, 0.05), rng.uniform(0.2, 0.5)])
+    return _pack("relaxing", breaks, shares / shares.sum(), others)
+
+
+def back_stress(rng: np.random.Generator, half: float, length: float) -> Operator:
+    """Draw yield as a share of the width, and the way over which the rest builds up."""
+    others = np.array([rng.uniform(0.3, 0.55), half * rng.uniform(1.2, 2.4)])
+    return _pack("back_stress", np.array([half * rng.uniform(1.15, 1.5)]), np.ones(1), others)
+
+
 def dahl(rng: np.random.Generator, half: float, length: float) -> Operator:
     """Draw a Dahl loop in length."""
     reach = np.array([length * rng.uniform(0.004, 0.012)])
@@ -181,4 +225,10 @@ DRAWS: dict[str, Callable[[np.random.Generator, float, float], Operator]] = {
     "rate_weak": rate_weak,
     "tanh_play": tanh_play,
     "dead_zone_play": dead_zone_play,
+    "slip_lag": slip_lag,
+    "duhem": duhem,
+    "elastoplastic": elastoplastic,
+    "ridge_play": ridge_play,
+    "relaxing": relaxing,
+    "back_stress": back_stress,
 }

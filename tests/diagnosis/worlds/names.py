@@ -16,6 +16,12 @@ WORLDS = (
     "end_caps_slack_tanh_play_long_tube",
     "drawn_curve_dead_zone_play_bulging_offset",
     "hyperbolic_tendon_rate_weak_cascade",
+    "kinked_table_slip_lag_coarse_fine",
+    "ogden_wall_duhem_back_calculation",
+    "segment_chain_elastoplastic_throttled_line",
+    "barrel_ridge_play_nozzle_flapper",
+    "stretched_spring_relaxing_slip_sampled",
+    "three_element_back_stress_gap_gain",
 )
 EFFECTS = (
     "creep",

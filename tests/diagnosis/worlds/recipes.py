@@ -108,6 +108,63 @@ def _cascade(rng: np.random.Generator) -> dict[str, float]:
     }
 
 
+def _coarse_fine(rng: np.random.Generator) -> dict[str, float]:
+    fill = rng.uniform(9.0, 15.0)
+    return {
+        "lag_s": rng.uniform(0.03, 0.06),
+        "fill_bar_s": fill,
+        "vent_bar_s": fill * rng.uniform(1.15, 1.6),
+        "coarse_bar": rng.uniform(0.3, 0.5),
+        "spool_s": rng.uniform(0.004, 0.008),
+    }
+
+
+def _back_calculation(rng: np.random.Generator) -> dict[str, float]:
+    lag, share, rate = rng.uniform(0.05, 0.07), rng.uniform(0.12, 0.2), rng.uniform(11.0, 16.0)
+    return {
+        "lag_s": lag,
+        "integral_s2": share / lag**2,
+        "windup_s": lag / share * rng.uniform(0.7, 0.8),
+        "fill_limit_s_bar": 1.0 / rate,
+        "vent_limit_s_bar": 1.0 / rate,
+    }
+
+
+def _throttle(rng: np.random.Generator) -> dict[str, float]:
+    return {
+        "lag_s": rng.uniform(0.03, 0.05),
+        "pilot_s": rng.uniform(0.03, 0.06),
+        "throttle_s2_bar": rng.uniform(0.006, 0.015),
+        "dead_time_s": rng.uniform(0.015, 0.035),
+    }
+
+
+def _flapper(rng: np.random.Generator) -> dict[str, float]:
+    pilot = rng.uniform(0.06, 0.1)
+    return {
+        "lag_s": rng.uniform(0.02, 0.035),
+        "pilot_s": pilot,
+        "vent_pilot_s": pilot * rng.uniform(1.15, 1.5),
+    }
+
+
+def _sampled(rng: np.random.Generator) -> dict[str, float]:
+    return {
+        "lag_s": rng.uniform(0.05, 0.1),
+        "sample_s": float(rng.choice([0.004, 0.006, 0.008])),
+        "quantum_bar_s": rng.uniform(0.03, 0.09),
+    }
+
+
+def _gap_gain(rng: np.random.Generator) -> dict[str, float]:
+    return {
+        "lag_s": rng.uniform(0.03, 0.05),
+        "low_gain": rng.uniform(0.35, 0.6),
+        "gap_bar": rng.uniform(0.15, 0.3),
+        "dead_time_s": rng.uniform(0.015, 0.04),
+    }
+
+
 @dataclass(frozen=True)
 class Recipe:
     """Kinds of law, loop and regulator of a world."""
@@ -163,6 +220,12 @@ RECIPES: dict[str, Recipe] = dict(
             Recipe("capped", "tanh_play", "pressure", "tube", _tube, width=1.15),
             Recipe("drawn", "dead_zone_play", "pressure", "offset", _bulging, width=1.15),
             Recipe("hyperbolic", "rate_weak", "length", "cascade", _cascade, (0.0, 0.3)),
+            Recipe("table", "slip_lag", "length", "coarse_fine", _coarse_fine, (0.0, 0.3), 1.2),
+            Recipe("ogden", "duhem", "pressure", "back_calculation", _back_calculation, width=1.1),
+            Recipe("chain", "elastoplastic", "length", "throttle", _throttle, (0.1, 0.4)),
+            Recipe("barrel", "ridge_play", "pressure", "flapper", _flapper),
+            Recipe("spring", "relaxing", "length", "sampled", _sampled, (0.0, 0.25), 1.2),
+            Recipe("three_element", "back_stress", "pressure", "gap_gain", _gap_gain, width=1.1),
         ),
         strict=True,
     )

@@ -194,18 +194,20 @@ UNLIKE = 0.03
 def truth_of(rig: Rig) -> dict[str, bool]:
     """Return which of four causes the normal physics of a rig contains.
 
-    A choked orifice limits the rate of large steps, so it counts as a rate limit. The exhaust
-    differs where orifice, rate limit or lag differ by more than 3 % from those of filling.
+    A choked orifice and a turbulent restriction limit the rate of large steps, so they count as
+    a rate limit. The exhaust differs where orifice, rate limit or lag differ by more than 3 % from
+    those of filling.
     """
     value = rig.valve_value
     pairs = (
         (value("fill_bar_s"), value("vent_bar_s")),
         (value("fill_limit_s_bar"), value("vent_limit_s_bar")),
         (value("lag_s"), value("vent_lag_s")) if value("vent_delay_s") > 0.0 else (0.0, 0.0),
+        (value("pilot_s"), value("vent_pilot_s")) if value("vent_pilot_s") > 0.0 else (0.0, 0.0),
     )
-    limited = value("fill_limit_s_bar") > 0.0 or value("fill_bar_s") > 0.0
+    limiting = ("fill_limit_s_bar", "fill_bar_s", "throttle_s2_bar")
     return {
-        "slew_limit": limited,
+        "slew_limit": any(value(key) > 0.0 for key in limiting),
         "dead_time": value("dead_time_s") >= 0.01,
         "hysteresis_drive": rig.length_driven,
         "exhaust_asymmetry": any(abs(b - a) > UNLIKE * a for a, b in pairs),

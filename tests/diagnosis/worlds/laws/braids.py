@@ -69,3 +69,94 @@ def capped_force(q: np.ndarray, pressure: float, strain: float) -> float:
     x = 1.0 - strain / (q[1] * share)
     active = q[0] * taut * (0.62 * x + 0.38 * x * abs(x)) * share
     return active - q[5] * strain - q[6] * strain**3 + lock(strain, q[7], q[8])
+
+
+@njit(cache=True)
+def _ogden_slope(q: np.ndarray, x: float, outer2: float, slope: float, ratio: float) -> float:
+    """Slope of the two-term Ogden energy over the axial stretch, at one radius of the wall.
+
+    `ratio` is the squared outer radius over that of the point, both unloaded.
+    """
+    hoop = math.sqrt(max(ratio * outer2 - (ratio - 1.0) / x, 0.05))
+    bend = (ratio * slope + (ratio - 1.0) / x**2) / (2.0 * hoop)
+    total = 0.0
+    for i in range(2):
+        power = q[4 + i]
+        term = x ** (power - 1.0) + hoop ** (power - 1.0) * bend
+        term -= (x * hoop) ** (-power - 1.0) * (hoop + x * bend)
+        total += q[2 + i] * term
+    return total
+
+
+@njit(cache=True)
+def ogden_force(q: np.ndarray, pressure: float, strain: float) -> float:
+    """Gas in a braid around a thick wall of Ogden rubber, whose inside strains most."""
+    cos2 = q[1]
+    sin2 = 1.0 - cos2
+    x = max(1.0 - q[8] * strain, 0.5)
+    gas = q[0] * pressure * (3.0 * cos2 * x * x - 1.0) / sin2
+    outer2 = max((1.0 - x * x * cos2) / sin2, 0.05)
+    slope = -2.0 * x * cos2 / sin2
+    wall = _ogden_slope(q, x, outer2, slope, q[6]) + _ogden_slope(q, x, outer2, slope, q[7])
+    return gas + 0.5 * wall + lock(strain, q[9], q[10])
+
+
+@njit(cache=True)
+def chain_force(q: np.ndarray, pressure: float, strain: float) -> float:
+    """Three lengths of braid in series: other angles, areas and rubber, the same force.
+
+    The constants of each are gas, squared-stretch factor, rubber and share of the length. Newton
+    steps find the force at which the contractions add up.
+    """
+    p = max(pressure, -1.0)
+    x2 = (1.0 - strain) ** 2
+    total = 0.0
+    for i in range(0, 12, 4):
+        gas, factor = q[i] * p, q[i + 1]
+        total += q[i + 3] * (gas * (factor * x2 - factor / 3.0 - 1.0) + q[i + 2] * (x2 - 1.0))
+    for _ in range(6):
+        error, slope = -strain, 0.0
+        for i in range(0, 12, 4):
+            steep = q[i] * p * q[i + 1] + q[i + 2]
+            square = (total + q[i] * p * (q[i + 1] / 3.0 + 1.0) + q[i + 2]) / steep
+            root = math.sqrt(max(square, 0.04))
+            stretch = root + (square - root * root) / (2.0 * root)
+            error += q[i + 3] * (1.0 - stretch)
+            slope -= q[i + 3] / (2.0 * root * steep)
+        total -= error / slope
+    return total + lock(strain, q[12], q[13])
+
+
+@njit(cache=True)
+def _barrel_sums(q: np.ndarray, radius: float, out: np.ndarray) -> None:
+    """Integrate along half a barrel: mean cosine, its slope over the radius, and the volume's.
+
+    Radii are relative to the largest that the threads allow; `radius` is that of the middle.
+    """
+    ends = math.sqrt(1.0 - q[1])
+    out[0] = out[1] = out[2] = 0.0
+    for i in range(8):
+        rest = max(1.0 - (i + 0.5) / 8.0 / q[2], 0.0)
+        grown = 1.0 - rest * rest
+        r = ends + (radius - ends) * grown
+        cosine = math.sqrt(max(1.0 - r * r, 0.02))
+        out[0] += cosine / 8.0
+        out[1] -= r * grown / cosine / 8.0
+        out[2] += (2.0 * cosine - r * r / cosine) * r * grown / 8.0
+
+
+@njit(cache=True)
+def barrel_force(q: np.ndarray, pressure: float, strain: float, work: np.ndarray) -> float:
+    """Virtual work of a short barrel: each ring between the clamped ends has its own angle."""
+    cosine, ends = math.sqrt(q[1]), math.sqrt(1.0 - q[1])
+    aim = (1.0 - strain) * cosine
+    sums = work[0]
+    radius = math.sqrt(max(1.0 - aim * aim, 0.01))
+    for _ in range(8):
+        _barrel_sums(q, radius, sums)
+        radius = min(max(radius - (sums[0] - aim) / sums[1], 0.1), 0.95)
+    _barrel_sums(q, radius, sums)
+    gas = -q[0] * pressure / (1.0 - q[1]) * sums[2] / sums[1]
+    hoop = radius / ends - 1.0
+    wall = q[3] * hoop * (1.0 + q[4] * hoop * hoop) * cosine / (ends * sums[1])
+    return gas + wall + lock(strain, q[5], q[6])

@@ -4,15 +4,20 @@ from collections.abc import Callable
 
 import numpy as np
 
+from .braid_draws import (
+    Constants,
+    barrel,
+    braid,
+    bundle,
+    capped,
+    chain,
+    lock,
+    locking,
+    ogden,
+    rubber,
+)
 from .elements import curve
 from .fitted import MAP_PRESSURE, MAP_SHAPE, MAP_STRAIN
-
-Constants = tuple[float, ...]
-
-
-def _lock(rng: np.random.Generator, area: float) -> Constants:
-    """Draw stiffness [N] and width of the stop at zero strain (`laws.lock`)."""
-    return rng.uniform(5500.0, 8000.0) * area, rng.uniform(0.008, 0.013)
 
 
 def _exponential(rng: np.random.Generator, area: float) -> Constants:
@@ -40,35 +45,7 @@ def _sine(rng: np.random.Generator, area: float) -> Constants:
         rng.uniform(370.0, 490.0) * area,
         rng.uniform(0.26, 0.34),
         rng.uniform(0.16, 0.26),
-        *_lock(rng, area),
-    )
-
-
-def _bundle(rng: np.random.Generator, area: float) -> Constants:
-    slack = np.sort(rng.uniform(0.0, rng.uniform(0.025, 0.05), 8))
-    slack[0] = 0.0
-    head = (
-        rng.uniform(400.0, 520.0) * area,
-        rng.uniform(0.25, 0.32),
-        rng.uniform(1.3, 1.7),
-        rng.uniform(0.12, 0.2),
-        *_lock(rng, area),
-        rng.uniform(0.015, 0.03),
-        0.0,
-    )
-    return (*head, *slack.tolist())
-
-
-def _braid(rng: np.random.Generator, area: float) -> Constants:
-    angle = np.radians(rng.uniform(25.0, 28.5))
-    return (
-        7.85 * area * rng.uniform(0.9, 1.1),
-        float(np.cos(angle) ** 2),
-        rng.uniform(0.1, 0.25),
-        rng.uniform(1.5, 3.0),
-        rng.uniform(22.0, 36.0) * area,
-        rng.uniform(3000.0, 4500.0) * area,
-        rng.uniform(0.006, 0.014),
+        *lock(rng, area),
     )
 
 
@@ -113,45 +90,6 @@ def _rational(rng: np.random.Generator, area: float) -> Constants:
     )
 
 
-def _locking(rng: np.random.Generator, area: float) -> Constants:
-    return (
-        rng.uniform(62.0, 78.0) * area,
-        rng.uniform(0.27, 0.34),
-        rng.uniform(450.0, 800.0) * area,
-        rng.uniform(0.085, 0.125),
-        rng.uniform(300.0, 750.0) * area,
-        rng.uniform(0.5, 1.5),
-        rng.uniform(0.001, 0.003),
-        *_lock(rng, area),
-    )
-
-
-def _rubber(rng: np.random.Generator, area: float) -> Constants:
-    return (
-        7.85 * area * rng.uniform(0.9, 1.1),
-        float(np.cos(np.radians(rng.uniform(24.0, 27.5))) ** 2),
-        rng.uniform(7.0, 12.0) * area,
-        rng.uniform(1.5, 5.0) * area,
-        rng.uniform(150.0, 400.0),
-        rng.uniform(1.05, 1.2),
-        rng.uniform(3000.0, 4500.0) * area,
-        rng.uniform(0.008, 0.013),
-    )
-
-
-def _capped(rng: np.random.Generator, area: float) -> Constants:
-    return (
-        rng.uniform(63.0, 80.0) * area,
-        rng.uniform(0.25, 0.3),
-        rng.uniform(0.06, 0.2),
-        rng.uniform(0.04, 0.07),
-        rng.uniform(0.06, 0.18),
-        rng.uniform(250.0, 500.0) * area,
-        rng.uniform(2e3, 8e3) * area,
-        *_lock(rng, area),
-    )
-
-
 def _drawn(rng: np.random.Generator, area: float) -> Constants:
     """Draw pressure needed over strain, convex then concave, and force per bar over strain."""
     slopes = np.array([1.5, 1.5, 1.15, 0.8, 0.7, 0.85, 1.4, 2.2]) * rng.uniform(0.9, 1.1, 8)
@@ -171,7 +109,32 @@ def _hyperbolic(rng: np.random.Generator, area: float) -> Constants:
         rng.uniform(64.0, 82.0) * area * bend * 6.0 ** (1.0 - power),
         power,
         rng.uniform(2.5e-5, 6.5e-5) / area,
-        *_lock(rng, area),
+        *lock(rng, area),
+    )
+
+
+def _spring(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        rng.uniform(0.33, 0.38),
+        rng.uniform(1.35, 1.6),
+        rng.uniform(2.6, 3.3),
+        rng.uniform(550.0, 800.0) * area,
+        rng.uniform(90.0, 140.0) * area,
+        rng.uniform(100.0, 250.0) * area,
+        rng.uniform(1e3, 3e3) * area,
+        *lock(rng, area),
+    )
+
+
+def _three_element(rng: np.random.Generator, area: float) -> Constants:
+    return (
+        rng.uniform(68.0, 82.0) * area,
+        rng.uniform(1400.0, 1700.0) * area,
+        rng.uniform(60.0, 110.0) * area,
+        rng.uniform(2.0, 3.0),
+        rng.uniform(0.25, 0.5),
+        rng.uniform(120.0, 170.0) * area,
+        *lock(rng, area),
     )
 
 
@@ -200,21 +163,53 @@ def draw_map(rng: np.random.Generator, area: float) -> Constants:
     return tuple((top * knots).ravel().tolist())
 
 
+TABLE_PRESSURES = (-1.0, 0.0, 0.6, 1.2, 2.0, 3.0, 4.0, 5.0, 6.3)
+TABLE_STRAINS = (-0.06, -0.02, 0.0, 0.02, 0.05, 0.08, 0.11, 0.15, 0.19, 0.24, 0.3, 0.36)
+
+
+def draw_table(rng: np.random.Generator, area: float) -> tuple[Constants, Constants]:
+    """Draw a table of forces [N] with errors of measurement of a per cent."""
+    p, e = np.array(TABLE_PRESSURES)[:, None], np.array(TABLE_STRAINS)[None, :]
+    r = e / rng.uniform(0.29, 0.35)
+    taut = p * (1.0 - rng.uniform(1.1, 1.35) * r + 0.25 * r * r)
+    taut = np.where(p < 0.0, p + 0.0 * r, taut)
+    knots = taut - rng.uniform(0.5, 0.8) * (1.0 - np.exp(-6.0 * r)) - rng.uniform(0.2, 0.6) * r
+    error = rng.normal(size=knots.shape)
+    size = rng.uniform(0.006, 0.012)
+    while True:
+        measured = knots + size * error * np.clip(p, 0.0, 3.0)
+        rise = np.diff(measured[:, :9], axis=0).min(axis=1) / np.diff(TABLE_PRESSURES)
+        if size < 1e-5:
+            raise ValueError("the table of forces is not monotonic")
+        if rise.min() > 0.02 and (np.diff(measured, axis=1) / np.diff(e)).max() < -0.3:
+            break
+        size *= 0.8
+    table = np.zeros(MAP_SHAPE)
+    table[1 : p.size + 1, 0], table[0, 1 : e.size + 1] = TABLE_PRESSURES, TABLE_STRAINS
+    table[1 : p.size + 1, 1 : e.size + 1] = rng.uniform(66.0, 82.0) * area * measured
+    return (*lock(rng, area), float(p.size), float(e.size)), tuple(table.ravel().tolist())
+
+
 _DRAWS: dict[str, Callable[[np.random.Generator, float], Constants]] = {
     "exponential": _exponential,
     "polynomial": _polynomial,
     "sine": _sine,
-    "bundle": _bundle,
-    "braid": _braid,
+    "bundle": bundle,
+    "braid": braid,
     "tangent": _tangent,
     "sarosi": _sarosi,
     "logistic": _logistic,
     "rational": _rational,
-    "locking": _locking,
-    "rubber": _rubber,
-    "capped": _capped,
+    "locking": locking,
+    "rubber": rubber,
+    "capped": capped,
     "drawn": _drawn,
     "hyperbolic": _hyperbolic,
+    "ogden": ogden,
+    "chain": chain,
+    "barrel": barrel,
+    "spring": _spring,
+    "three_element": _three_element,
 }
 
 
@@ -222,5 +217,8 @@ def draw_law(name: str, rng: np.random.Generator, area: float) -> tuple[Constant
     """Draw 16 constants of a law and its map (empty for most); `area` is relative to 10 mm."""
     if name == "map":
         return (0.0,) * 16, draw_map(rng, area)
+    if name == "table":
+        constants, knots = draw_table(rng, area)
+        return constants + (0.0,) * (16 - len(constants)), knots
     constants = tuple(float(value) for value in _DRAWS[name](rng, area))
     return constants + (0.0,) * (16 - len(constants)), ()

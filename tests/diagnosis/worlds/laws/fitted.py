@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .elements import lock, signed_power
+from .elements import lock, signed_power, softplus
 
 MAP_SHAPE = (14, 16)
 """Knots of a drawn map over pressure and strain."""
@@ -71,3 +71,40 @@ def hyperbolic_force(q: np.ndarray, pressure: float, strain: float) -> float:
     b = strain + q[1] + q[0] * q[4]
     root = max(b * b - 4.0 * q[4] * (q[0] * (strain + q[1]) - reach), 0.0)
     return (math.sqrt(root) - b) / (2.0 * q[4]) + lock(strain, q[5], q[6])
+
+
+@njit(cache=True)
+def table_force(q: np.ndarray, table: np.ndarray, pressure: float, strain: float) -> float:
+    """Measured table: straight between its uneven knots, and on beyond its edges.
+
+    The first row of `table` holds the strains, the first column the pressures; `q` begins with
+    stiffness and width of the stop at zero strain, and with the numbers of pressures and strains.
+    """
+    i, j = 1, 1
+    while i < int(q[2]) - 1 and pressure > table[i + 1, 0]:
+        i += 1
+    while j < int(q[3]) - 1 and strain > table[0, j + 1]:
+        j += 1
+    a = (pressure - table[i, 0]) / (table[i + 1, 0] - table[i, 0])
+    b = (strain - table[0, j]) / (table[0, j + 1] - table[0, j])
+    low = (1.0 - b) * table[i, j] + b * table[i, j + 1]
+    high = (1.0 - b) * table[i + 1, j] + b * table[i + 1, j + 1]
+    return (1.0 - a) * low + a * high + lock(strain, q[0], q[1])
+
+
+@njit(cache=True)
+def spring_force(q: np.ndarray, pressure: float, strain: float) -> float:
+    """Spring stretched from the contraction without load, stiffer with pressure and stretch."""
+    raised = signed_power(pressure, q[1])
+    free = q[0] * raised / (abs(raised) + q[2] ** q[1])
+    stretch = free - strain
+    stiffness = q[3] + max(pressure, 0.0) * (q[4] + q[5] * stretch) + q[6] * stretch * stretch
+    return stiffness * stretch + lock(strain, q[7], q[8])
+
+
+@njit(cache=True)
+def element_force(q: np.ndarray, pressure: float, strain: float) -> float:
+    """Contractile force beside a spring whose stiffness falls and then rises with pressure."""
+    knee = softplus(pressure - q[3], q[4]) - softplus(-q[3], q[4])
+    stiffness = q[1] - q[2] * pressure + (q[2] + q[5]) * knee
+    return q[0] * pressure - max(stiffness, 0.2 * q[1]) * strain + lock(strain, q[6], q[7])

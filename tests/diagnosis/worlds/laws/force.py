@@ -5,9 +5,26 @@ import math
 import numpy as np
 from numba import njit
 
-from .braids import braid_force, bundle_force, capped_force, locking_force, rubber_force
+from .braids import (
+    barrel_force,
+    braid_force,
+    bundle_force,
+    capped_force,
+    chain_force,
+    locking_force,
+    ogden_force,
+    rubber_force,
+)
 from .elements import curve, lock
-from .fitted import hyperbolic_force, logistic_force, map_force, tangent_force
+from .fitted import (
+    element_force,
+    hyperbolic_force,
+    logistic_force,
+    map_force,
+    spring_force,
+    table_force,
+    tangent_force,
+)
 
 LAWS = (
     "exponential",
@@ -25,6 +42,12 @@ LAWS = (
     "capped",
     "drawn",
     "hyperbolic",
+    "table",
+    "ogden",
+    "chain",
+    "barrel",
+    "spring",
+    "three_element",
 )
 
 
@@ -77,6 +100,18 @@ def force(
         return taut * curve(q, 9, 6, 0.08, strain) + lock(strain, q[15], 0.01)
     if kind == 14:
         return hyperbolic_force(q, pressure, strain)
+    if kind == 15:
+        return table_force(q, table, pressure, strain)
+    if kind == 16:
+        return ogden_force(q, pressure, strain)
+    if kind == 17:
+        return chain_force(q, pressure, strain)
+    if kind == 18:
+        return barrel_force(q, pressure, strain, work)
+    if kind == 19:
+        return spring_force(q, pressure, strain)
+    if kind == 20:
+        return element_force(q, pressure, strain)
     r = strain / q[1]
     active = pressure / 6.0 * max(1.0 - r, 0.0) ** q[2] / max(1.0 + q[3] * r, 0.5)
     passive = q[4] * r / max(1.0 + q[5] * r, 0.5)
