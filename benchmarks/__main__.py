@@ -598,7 +598,7 @@ def diagnosis(
     """Benchmark the diagnosis on simulated rigs with hidden effects; an interrupted run resumes.
 
     Args:
-        chosen: Set of cases; "worlds" are rigs of fifteen other simulations, "families" those of
+        chosen: Set of cases; "worlds" are rigs of twenty-one other simulations, "families" those of
             joints, orthoses and arms, "mutilated" are spoiled recordings.
         offset: Number of the random draw of cases; development on worlds and families uses one
             above 0.

@@ -1,4 +1,4 @@
-"""Simulated rigs that share no code with the plants: that of the first study, and fifteen worlds.
+"""Simulated rigs without code of the plants: that of the first study, and twenty-one worlds.
 
 A *world* is a force law, a hysteresis and a regulator of a laboratory of its own
 (``tests/diagnosis/worlds``). Its authors knew neither the base of the diagnosis nor its causes'

@@ -23,6 +23,8 @@ EACH = {
 LATE = (-2.0, -1.0, 0.5, 1.0, 2.0)
 """Rows by which readings are late."""
 WORLD_SEEDS, KIND_SEEDS = 5_000, 500  # numbers of seeds of a world, and of a kind in it
+SPACED = 15
+"""Worlds with that many seeds each; the seeds of later ones follow without gaps."""
 
 Draw = Callable[[int, int, np.random.Generator], Iterator[Case]]
 
@@ -39,7 +41,8 @@ def cases(offset: int = 0, each: Mapping[str, int] | None = None) -> list[Case]:
     made: list[Case] = []
     for i, world in enumerate(WORLDS):
         for k, kind in enumerate(EACH):
-            start = first_seed("worlds", offset) + WORLD_SEEDS * i + KIND_SEEDS * k
+            place = WORLD_SEEDS * min(i, SPACED) + KIND_SEEDS * len(EACH) * max(i - SPACED, 0)
+            start = first_seed("worlds", offset) + place + KIND_SEEDS * k
             drawn = DRAWS[kind](i, EACH[kind], np.random.default_rng(start))
             numbered = [replace(c, world=world, seed=start + n) for n, c in enumerate(drawn)]
             made += _first(numbered, each.get(kind, 0)) if each else numbered
