@@ -110,11 +110,12 @@ def flow_step(
         rows[state + AIR_STATE.space],
         rows[state + AIR_STATE.drop],
     )
-    on, gain, dead, band = (
+    on, gain, dead, band, bends = (
         fixed[effects + AIR.flow],
         fixed[effects + AIR.gain],
         fixed[effects + AIR.dead_band],
         fixed[effects + AIR.opening_band],
+        fixed[effects + AIR.opening_bend],
     )
     supply, share, critical = (
         fixed[effects + AIR.conductance],
@@ -126,6 +127,7 @@ def flow_step(
     reached = found[0]
     for j in range(LANES):
         p, wide, per_band, b = regulated[j], dead[j], 1.0 / band[j], critical[j]
+        bend = bends[j]
         span = 1.0 / (1.0 - b)
         first = 1.0 - late[j] if older[j] >= 0.0 else 0.0
         last = late[j] if newer[j] >= 0.0 else 0.0
@@ -139,12 +141,12 @@ def flow_step(
         high = max(p, min(source, max(end, next_end) - wide))
         low = min(p, max(0.0, min(end, next_end) + wide))
         rate = h * PRESSURE_PER_DENSITY / max(LEAST_VOLUME, space[j])
-        opened = first * valve_opening(p, goal, wide, per_band)
-        opened = opened + last * valve_opening(p, next_goal, wide, per_band)
+        opened = first * valve_opening(p, goal, wide, per_band, bend)
+        opened = opened + last * valve_opening(p, next_goal, wide, per_band, bend)
         middle = p + 0.5 * rate * inflow(opened, p, fed, fills, empties, b, span)
         middle = max(low, min(high, middle))
-        opened = first * valve_opening(middle, goal, wide, per_band)
-        opened = opened + last * valve_opening(middle, next_goal, wide, per_band)
+        opened = first * valve_opening(middle, goal, wide, per_band, bend)
+        opened = opened + last * valve_opening(middle, next_goal, wide, per_band, bend)
         after = p + rate * inflow(opened, middle, fed, fills, empties, b, span)
         after = max(low, min(high, after))
         reached[j] = after if on[j] > 0.0 else p

@@ -25,8 +25,9 @@ REPLACED = (
     *("slew_bend", "slew_ratio", "overlap", "exhaust_ratio", "exhaust_rate", "pilot_lag"),
     *("pilot_damping", "overlap_leak", "exhaust_taper", "dead_close", "supply_time"),
     *("time_constant", "slew_rate", "supply_effect"),
+    *("speed_2", "speed_6", "speed_20", "speed_60", "integral", "integral_release"),
 )
-"""Parameters of a regulator that the orifices replace; the first six and the last are off."""
+"""Parameters of a regulator that the orifices replace."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +41,7 @@ class FlowEffects:
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
         (
             *("flow", "conductance", "exhaust_share", "critical_ratio", "opening_band"),
-            *("polytropic", "source_pressure"),
+            *("opening_bend", "polytropic", "source_pressure"),
         ),
     )
 
@@ -55,6 +56,7 @@ class FlowEffects:
     opening_band: float = assumed(
         3.4e4, "Pa", 1e3, 5e5, "error that opens fully: lag of 50 ms times 6.8e5 Pa/s"
     )
+    opening_bend: float = effect("1", -0.9, 1.0, "0: opening in proportion to error; 1: to square")
     polytropic: float = assumed(
         1.0, "1", 1.0, 1.4, "of compression by motion alone; 1: isothermal, 1.4: adiabatic"
     )
@@ -75,15 +77,16 @@ def mass_flow(upstream: float, downstream: float, conductance: float, critical: 
 
 
 @kernel
-def valve_opening(pressure: float, goal: float, dead: float, per_band: float) -> float:
+def valve_opening(pressure: float, goal: float, dead: float, per_band: float, bend: float) -> float:
     """Return the opening of the valve, from -1 (exhaust) to 1 (supply).
 
     ``dead`` is the error [Pa] that it does not answer, ``per_band`` one over the further error that
-    opens it fully.
+    opens it fully, ``bend`` the ``opening_bend``.
     """
     error = goal - pressure
     answered = max(0.0, error - dead) + min(0.0, error + dead)
-    return clip(answered * per_band, -1.0, 1.0)
+    opened = clip(answered * per_band, -1.0, 1.0)
+    return opened * (1.0 + bend * (abs(opened) - 1.0))  # type: ignore[no-any-return]
 
 
 @kernel

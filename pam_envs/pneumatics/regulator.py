@@ -3,7 +3,8 @@
 Dead time, slew limit, first-order lag, saturation.
 
 Its effects are those of valve, supply and line: static gain, rounded slew limit, dead band of a
-valve that closes, overlap of a spool, slower and choked exhaust, leak.
+valve that closes, overlap of a spool, characteristic of the valve (rate over error), slower and
+choked exhaust, leak.
 """
 
 import math
@@ -130,6 +131,16 @@ class ValveEffects:
     overlap_leak: float = assumed(0.01, "1", 1e-4, 1.0, "gain within the overlap over the full one")
     exhaust_ratio: float = assumed(1.0, "1", 0.1, 20.0, "exhaust lag over filling lag", neutral=1.0)
     exhaust_taper: float = assumed(0.0, "1", 0.0, 1.0, "loss of exhaust_ratio at full pressure")
+    integral: float = effect("1/s2", 0.0, 1e4, "rate that an error adds per second, over the error")
+    integral_release: float = assumed(
+        0.3, "s", 0.005, 1e3, "time in which it falls to a rate that the limits let through"
+    )
+    speed_2: float = assumed(
+        1.0, "1", 0.02, 20.0, "rate over error, at 2 % of full pressure over at none", neutral=1.0
+    )
+    speed_6: float = assumed(1.0, "1", 0.02, 20.0, "the same at 6 %", neutral=1.0)
+    speed_20: float = assumed(1.0, "1", 0.02, 20.0, "the same at 20 %", neutral=1.0)
+    speed_60: float = assumed(1.0, "1", 0.02, 20.0, "the same at 60 % and above", neutral=1.0)
     exhaust_rate: float = assumed(
         UNCHOKED, "1/s", 0.05, UNCHOKED, "choked exhaust over absolute pressure", neutral=UNCHOKED
     )
@@ -149,6 +160,8 @@ class RegulatorEffects(FlowEffects, LineEffects, SupplyEffects, ValveEffects):
         ("dead_band", "dead_close"),
         ("overlap", "overlap_leak"),
         ("exhaust_ratio", "exhaust_taper"),
+        ("speed_2", "speed_6", "speed_20", "speed_60"),
+        ("integral", "integral_release"),
         ("exhaust_rate",),
         ("leak",),
         ("pilot_lag", "pilot_damping"),
@@ -233,7 +246,7 @@ AIR = parameter_rows(RegulatorEffects)
 """Rows of the effects of valve, supply and line, from the first."""
 AIR_STATE = named_rows(
     *("regulated", "opened", "drop", "lost", "line", "line_rate", "pilot", "pilot_rate"),
-    *("space", "here", "gives", "ahead", "slope"),
+    *("integral", "space", "here", "gives", "ahead", "slope"),
 )
 """Rows of the state of valve, supply and line, from the first, with the pressure that the leak has
 lost in the control period [Pa] (``lost``); then those of the air in the muscle:
@@ -342,6 +355,20 @@ def lag_towards(
 
 
 @kernel
+def speed_at(fixed: Any, j: int, effects: int, error: float) -> float:
+    """Return the rate over the error, relative to that at none, for an error over full pressure.
+
+    It is linear between the shares of full pressure at which it is given.
+    """
+    at_2, at_6 = fixed[effects + AIR.speed_2][j], fixed[effects + AIR.speed_6][j]
+    at_20, at_60 = fixed[effects + AIR.speed_20][j], fixed[effects + AIR.speed_60][j]
+    speed = 1.0 + (at_2 - 1.0) * min(1.0, error * 50.0)
+    speed = speed + (at_6 - at_2) * min(1.0, max(0.0, error - 0.02) * 25.0)
+    speed = speed + (at_20 - at_6) * min(1.0, max(0.0, error - 0.06) / 0.14)
+    return speed + (at_60 - at_20) * min(1.0, max(0.0, error - 0.2) * 2.5)  # type: ignore[no-any-return]
+
+
+@kernel
 def leaked(
     rows: Any, fixed: Any, j: int, state: int, effects: int, rest: float, pressure: float,
     reached: float, h: float,
@@ -419,11 +446,16 @@ def regulate_with_effects(
     goal = goal if opened > 0.0 else pressure
     stop_low, stop_high = min(pressure, goal + band), max(pressure, goal - band)
     lag = lag_towards(fixed, j, effects, lag, pressure, goal, full)
+    error = abs(goal - pressure) / full
+    middle = error * decay(0.5 * h * speed_at(fixed, j, effects, error) / lag)
+    lag = lag / speed_at(fixed, j, effects, middle)
     # a spool opens by the error beyond its overlap; within the overlap it leaks
     over, within = fixed[effects + AIR.overlap][j], fixed[effects + AIR.overlap_leak][j]
     shift = over * (1.0 - within) if abs(goal - pressure) > over else 0.0
     lag = lag / within if abs(goal - pressure) < over else lag
     aim = goal + shift if goal < pressure else goal - shift
+    gathered, gain = rows[state + AIR_STATE.integral][j], fixed[effects + AIR.integral][j]
+    aim = aim + lag * gathered
     slew = slew * (fixed[effects + AIR.slew_ratio][j] if aim < pressure else 1.0)
     reached = regulator_step(pressure, aim, lag, 1.0 / lag, slew, 1.0 / slew, h)
     free = (aim - pressure) * (1.0 - decay(h / lag))
@@ -438,10 +470,15 @@ def regulate_with_effects(
     reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
     # the valve closes when the error has fallen to the band
     stopped = min(reached, stop_high) if goal > pressure else max(reached, stop_low)
+    stopped = stopped if wide > 0.0 or gain == 0.0 else max(0.0, reached)
     stays = opened if stopped == reached else 0.0
     rows[state + AIR_STATE.opened][j] = stays if h > 0.0 else before
     reached = stopped
     reached = pressure if target < 0.0 else reached
+    # the integral follows the rate that the limits let through
+    missed = (reached - pressure - free) / fixed[effects + AIR.integral_release][j]
+    gathered = gathered + h * gain * (goal - 0.5 * (pressure + reached)) + missed
+    rows[state + AIR_STATE.integral][j] = gathered if gain > 0.0 and target >= 0.0 else 0.0
     return leaked(rows, fixed, j, state, effects, rest, pressure, reached, h)
 
 
@@ -482,7 +519,7 @@ def begin_air(rows: Any, j: int, state: int, pressure: float) -> None:
     rows[state + AIR_STATE.regulated][j] = rows[state + AIR_STATE.line][j] = pressure
     rows[state + AIR_STATE.pilot][j], rows[state + AIR_STATE.pilot_rate][j] = pressure, 0.0
     rows[state + AIR_STATE.opened][j] = rows[state + AIR_STATE.drop][j] = 0.0
-    rows[state + AIR_STATE.lost][j] = 0.0
+    rows[state + AIR_STATE.lost][j] = rows[state + AIR_STATE.integral][j] = 0.0
     rows[state + AIR_STATE.line_rate][j] = rows[state + AIR_STATE.space][j] = 0.0
     rows[state + AIR_STATE.ahead][j] = rows[state + AIR_STATE.slope][j] = 0.0
 
@@ -506,6 +543,11 @@ def valve_effects_on(fixed: Any, effects: int) -> int:
         + count_on(fixed[effects + AIR.slew_ratio], 1.0)
         + count_on(fixed[effects + AIR.pilot_lag], 0.0)
         + count_on(fixed[effects + AIR.exhaust_taper], 0.0)
+        + count_on(fixed[effects + AIR.integral], 0.0)
+        + count_on(fixed[effects + AIR.speed_2], 1.0)
+        + count_on(fixed[effects + AIR.speed_6], 1.0)
+        + count_on(fixed[effects + AIR.speed_20], 1.0)
+        + count_on(fixed[effects + AIR.speed_60], 1.0)
         + count_on(fixed[effects + AIR.supply_effect], 0.0)
     )
     daily = (

@@ -6,7 +6,7 @@ No noise of the orthoses' sensors is published; the defaults are of the order se
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from pam_envs.kernels.arithmetic import count_on, decay
+from pam_envs.kernels.arithmetic import count_on, decay, sine_of_turns
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import N_HISTORY, fill_ring, note, noted
 from pam_envs.parameters import assumed, effect, parameter_rows
@@ -21,14 +21,15 @@ SLIDE = 0.2
 class SensorEffects:
     """Effects of any sensor, neutral unless a recording shows them.
 
-    A reading is ``x + (bow + wave (2 u - 1)) x (u - 1) + drift + ramp + slip``, ``u = x / full``,
-    of the quantity ``x`` that the sensor measured ``delay`` seconds ago. ``quantity`` is its unit
-    and the largest drift, ramp and slip.
+    A reading is ``x + (bow + wave (2 u - 1)) x (u - 1) + drift + cycle + ramp + slip``,
+    ``u = x / full``, of the quantity ``x`` that the sensor measured ``delay`` seconds ago.
+    ``quantity`` is its unit and the largest drift, cycle, ramp and slip.
     """
 
     quantity: ClassVar[tuple[str, float]] = ("1", 1.0)
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
         ("drift", "drift_time"),
+        ("cycle_sine", "cycle_cosine", "cycle_time"),
         ("ramp", "ramp_at", "ramp_over"),
         ("delay",),
         ("bow",),
@@ -38,6 +39,9 @@ class SensorEffects:
 
     drift: float = effect("{}/s", -1.0, 1.0, "at the start")
     drift_time: float = assumed(1e4, "s", 1.0, 1e4, "time in which the drift settles")
+    cycle_sine: float = effect("{}", -1.0, 1.0, "of a periodic drift, as of a room's temperature")
+    cycle_cosine: float = effect("{}", -1.0, 1.0, "of the same drift, less its start")
+    cycle_time: float = assumed(300.0, "s", 10.0, 1e5, "its period")
     ramp: float = effect("{}", -1.0, 1.0, "drift that ends")
     ramp_at: float = assumed(0.0, "s", 0.0, 1e6, "its middle")
     ramp_over: float = assumed(60.0, "s", 1.0, 1e6, "its duration")
@@ -165,6 +169,13 @@ def drift_of(time: float, rate: float, span: float) -> float:
 
 
 @kernel
+def cycle_of(time: float, sine: float, cosine: float, period: float) -> float:
+    """Return a periodic drift, zero at the start."""
+    turns = time / period
+    return sine * sine_of_turns(turns) + cosine * (sine_of_turns(turns + 0.25) - 1.0)
+
+
+@kernel
 def ramp_of(time: float, middle: float, over: float) -> float:
     """Return a smooth rise from 0 to 1 about a middle [s]."""
     s = max(0.0, min(1.0, (time - middle) / over + 0.5))
@@ -222,6 +233,15 @@ def sense(
                 (step[j] + 1) * period,
                 fixed[effects + SENSOR.drift][j],
                 fixed[effects + SENSOR.drift_time][j],
+            )
+    cycles = count_on(fixed[effects + SENSOR.cycle_sine], 0.0)
+    if cycles + count_on(fixed[effects + SENSOR.cycle_cosine], 0.0) > 0:
+        for j in range(LANES):
+            shown[j] = shown[j] + cycle_of(
+                (step[j] + 1) * period,
+                fixed[effects + SENSOR.cycle_sine][j],
+                fixed[effects + SENSOR.cycle_cosine][j],
+                fixed[effects + SENSOR.cycle_time][j],
             )
     moves = count_on(fixed[effects + SENSOR.ramp], 0.0) + count_on(
         fixed[effects + SENSOR.slip], 0.0

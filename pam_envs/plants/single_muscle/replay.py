@@ -81,6 +81,11 @@ COSTLY = (
         "regulator.leak",
         "regulator.supply_pressure",
         "regulator.pilot_lag",
+        "regulator.speed_2",
+        "regulator.speed_6",
+        "regulator.speed_20",
+        "regulator.speed_60",
+        "regulator.integral",
     ),
     (
         "hysteresis.shape",

@@ -13,6 +13,9 @@ EVERY_EFFECT = {
     "regulator.overlap_leak": 0.02,
     "regulator.exhaust_ratio": 1.3,
     "regulator.exhaust_taper": 0.5,
+    "regulator.speed_2": 0.8,
+    "regulator.speed_60": 0.6,
+    "regulator.integral": 20.0,
     "regulator.exhaust_rate": 8.0,
     "regulator.leak": 0.02,
     "regulator.supply_pressure": 6.3e5,
@@ -52,11 +55,15 @@ EVERY_EFFECT = {
     "position.delay": 0.013,
     "position.bow": 0.01,
     "position.wave": 0.01,
+    "position.cycle_sine": 2e-5,
+    "position.cycle_cosine": -3e-5,
+    "position.cycle_time": 20.0,
     "position.slip": 1e-4,
     "position.slip_at": 0.3,
     "pressure.drift": 10.0,
     "pressure.bow": 0.01,
     "pressure.wave": 0.01,
+    "pressure.cycle_cosine": 200.0,
 }
 """Every effect at once."""
 

@@ -2,7 +2,8 @@
 
 Electronics warm up, a clamp or a coating settles, a bridge amplifier follows the room temperature.
 The error depends on time alone, not on the muscle: it settles exponentially, or changes between two
-moments and then is constant. A change within 40 s is a bias.
+moments and then is constant, or follows the cycle of a heating beside a steady drift. A change
+within 40 s is a bias.
 """
 
 from collections.abc import Callable
@@ -11,6 +12,8 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.causes.sensing.sensor_bias import LONGEST
 from pam_envs.diagnosis.fit.starting_values import Starts, changes_of
 
+CYCLES = (200.0, 350.0)
+"""Starting values of the period of a heating [s]."""
 SLOW = (50.0, 150.0)
 """Starting values of the duration of a slow change [s]."""
 
@@ -26,6 +29,19 @@ def _ramp(name: str, sensor: str, size: float, search: Callable[..., Starts]) ->
     return Form(name, (Term(f"{sensor}.ramp", (size,), scale=size), start, duration), search)
 
 
+def _cycle(name: str, sensor: str, size: float) -> Form:
+    parts = (Term(f"{sensor}.cycle_{part}", (size,), scale=size) for part in ("sine", "cosine"))
+    steady = Term(f"{sensor}.drift", (0.01 * size,), scale=0.01 * size)
+    return Form(
+        name,
+        (
+            *parts,
+            steady,
+            Term(f"{sensor}.cycle_time", CYCLES, low=120.0, high=1500.0, log=True, amount=False),
+        ),
+    )
+
+
 CAUSE = Cause(
     name="sensor_drift",
     title="a drifting sensor",
@@ -34,6 +50,8 @@ CAUSE = Cause(
         _ramp("ramp", "position", 1e-4, changes_of(0, SLOW)),
         _settling("pressure", 10.0, 1000.0),
         _ramp("pressure ramp", "pressure", 1e3, changes_of(1, SLOW)),
+        _cycle("cycle", "position", 1e-4),
+        _cycle("pressure cycle", "pressure", 1e3),
     ),
     signature="a slow function of time, equal at rest and under pressure, on one output only",
     contains=("sensor_bias", "slip_step"),

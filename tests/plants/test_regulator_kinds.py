@@ -1,0 +1,85 @@
+"""Regulators whose rate is no multiple of the error: characteristic, integral part, opening."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.rollout import simulate
+from pam_envs.pneumatics.flow import valve_opening
+
+LAG, RATE, FULL = 0.05, 3e6, 6e5
+PLAIN = SingleMuscle.mas10("none").replace(
+    {"regulator.dead_time": 0.0, "regulator.slew_rate": 1e9, "regulator.time_constant": LAG}
+)
+SPEEDS = {2: 0.8, 6: 0.6, 20: 0.4, 60: 0.25}
+
+
+def pressures(changes: dict[str, float], command: Any) -> Any:
+    """Return the pressures [Pa] after each period of a command [Pa], shape (T,)."""
+    return simulate(PLAIN.replace(changes), command)["pressure"]
+
+
+def steps(*levels: float) -> Any:
+    """Return a command [Pa] with a second at each level."""
+    return np.repeat(levels, round(1.0 / PLAIN.control_period))
+
+
+def solved(rates: Any, command: Any, state: Any) -> Any:
+    """Return the pressures [Pa] of equations written out beside the kernels, shape (T,)."""
+    period, made = PLAIN.control_period, []
+    for target in command:
+        found = solve_ivp(rates, (0.0, period), state, "LSODA", rtol=1e-8, atol=1.0, args=(target,))
+        state = found.y[:, -1]
+        state[0] = max(0.0, state[0])
+        made.append(state[0])
+    return np.array(made)
+
+
+def test_rate_follows_the_characteristic() -> None:
+    command = steps(4e5, 1e5, 1.1e5, 5.5e5)
+    shares, speeds = [0.0, *(k / 100 for k in SPEEDS)], [1.0, *SPEEDS.values()]
+
+    def rates(_: float, p: Any, target: float) -> Any:
+        error = target - p[0]
+        return [error / LAG * np.interp(abs(error) / FULL, shares, speeds)]
+
+    made = pressures({f"regulator.speed_{k}": v for k, v in SPEEDS.items()}, command)
+    expected = solved(rates, command, np.zeros(1))
+    assert np.abs(made - pressures({}, command)).max() > 2e4
+    np.testing.assert_allclose(made, expected, atol=1.5e3)
+
+
+def test_integral_part_overshoots_and_settles_on_the_setpoint() -> None:
+    command, gain, release = steps(4e5, 1e5, 1.1e5, 5.5e5), 50.0, 2.0
+
+    def rates(_: float, state: Any, target: float) -> Any:
+        error = target - state[0]
+        wanted = error / LAG + state[1]
+        rate = np.clip(wanted, -RATE, RATE)
+        return [rate, gain * error + (rate - wanted) / release]
+
+    changes = {"regulator.integral": gain, "regulator.integral_release": release}
+    made = pressures(changes | {"regulator.slew_rate": RATE}, command)
+    expected = solved(rates, command, np.zeros(2))
+    second = len(command) // 4
+    assert made[:second].max() > 4.05e5 and made[second : 2 * second].min() < 0.95e5
+    np.testing.assert_allclose(made, expected, atol=2.5e3)
+
+
+def test_integral_part_starts_again_behind_a_shut_valve() -> None:
+    command = np.concatenate([steps(4e5), np.full(30, -1.0), steps(4e5)])
+    made = pressures({"regulator.integral": 50.0}, command)
+    n = len(steps(0.0))
+    held = made[n : n + 30]
+    np.testing.assert_allclose(held, held[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("bend", [-0.5, 0.0, 1.0])
+def test_opening_bends_between_shut_and_fully_open(bend: float) -> None:
+    shut, half, full = (valve_opening(1e5, 1e5 + e, 0.0, 1e-4, bend) for e in (0.0, 5e3, 2e4))
+    assert (shut, full) == (0.0, 1.0)
+    assert half == pytest.approx(0.5 * (1.0 - 0.5 * bend))
+    assert valve_opening(1e5, 9.5e4, 0.0, 1e-4, bend) == pytest.approx(-half)
