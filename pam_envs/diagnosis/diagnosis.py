@@ -344,7 +344,7 @@ class Study:
         """Selection of the differences in which rigs commonly depart from the base."""
         data = (self.problem, self.family, self.blocks, self.base, self.rule)
         made = self.fitted
-        starts = made.guesses, made.rate, made.linear, made.begins, made.others
+        starts = made.guesses, made.shown, made.linear, made.begins, made.others
         return FlexibleBase(*data, *starts)
 
     def make_flexible(self, causes: Sequence[Cause]) -> None:
@@ -402,7 +402,8 @@ class Study:
         """Drop the common differences that the model of the decision does not need."""
         assert self.decision is not None
         if self.decision.level and any(cause.common for cause, _ in self.model.causes):
-            self.decision.model = self.flexible.needed(self.decision.model)
+            acting = self.flexible.acting(self.decision.model)
+            self.decision.model = self.flexible.needed(acting)
 
     def beside(self, base: Candidate) -> list[Cause]:
         """Return the causes that the recording can show beside the differences of a base."""

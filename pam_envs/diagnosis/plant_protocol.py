@@ -195,8 +195,8 @@ class Fitted(Protocol):
         """Starting values by parameter, of the base and its common differences."""
 
     @property
-    def rate(self) -> Form | None:
-        """Form of the limited rate that the pressure needs."""
+    def shown(self) -> Mapping[str, Form]:
+        """Effects of the valve that the pressure clearly shows, by cause."""
 
     @property
     def linear(self) -> bool:

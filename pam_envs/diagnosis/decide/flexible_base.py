@@ -6,7 +6,7 @@ have been fitted (kennedy2001). A difference that the recording does not need is
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -112,7 +112,8 @@ class FlexibleBase:
     base: Candidate
     rule: Rule
     guesses: Sequence[Mapping[str, float]] = ()  # starting values by parameter
-    rate: Form | None = None  # form of the limited rate that the pressure needs
+    # effects of the valve that the pressure clearly shows, by cause
+    shown: Mapping[str, Form] = field(default_factory=dict)
     # whether a linear model may show that a difference is needed, without a refit
     linear: bool = True
     begins: Sequence[str] = ()  # parameters of the start of the recording
@@ -122,17 +123,20 @@ class FlexibleBase:
     def chosen(self, causes: Sequence[Cause]) -> list[tuple[Cause, Form]]:
         """Return the common differences that the base lacks, each in the form of all its forms.
 
-        A limited rate is among them where the pressure alone has shown it.
+        Effects of the valve are among them where the pressure alone has shown them.
         """
         known = {f.name for f in self.base.fit.frees}
         made = []
         for cause in causes:
-            rate = next((form for form in cause.forms if form is self.rate), None)
-            if cause.in_valve and rate is None:
+            shown = self.shown.get(cause.name)
+            if shown is not None:
+                difference = replace(cause, common=True, by_nature=True), shown
+            elif cause.common and not cause.in_valve:
+                difference = cause, together(cause.forms)
+            else:
                 continue
-            form = rate or together(cause.forms)
-            if not any(t.name in known for t in form.terms):
-                made.append((cause, form))
+            if not any(t.name in known for t in difference[1].terms):
+                made.append(difference)
         return made
 
     def alternatives(self, causes: Sequence[Cause], normal: Candidate) -> Iterator[Candidate]:
@@ -140,13 +144,13 @@ class FlexibleBase:
 
         An effect that is no common difference may have led the selection to another friction.
         """
-        chosen = self.chosen([c for c in causes if c.common])
+        chosen = self.chosen(causes)
         for guess in self.others():
             alone = []
             for cause, form in chosen:
-                rate = form is self.rate
-                terms = tuple(t for t in form.terms if rate or t.name in guess)
-                if any(t.amount for t in terms) and (not rate or cause.name in normal.names):
+                shown = cause.name in self.shown
+                terms = tuple(t for t in form.terms if shown or t.name in guess)
+                if any(t.amount for t in terms) and (not shown or cause.name in normal.names):
                     alone.append((cause, replace(form, terms=terms)))
             model = replace(self, guesses=(guess,)).fitted(alone, 0)
             if self.blocks.gain(normal.errors, model.errors) < -FAR:
@@ -265,10 +269,11 @@ class FlexibleBase:
 
     def select(self, causes: Sequence[Cause]) -> Candidate:
         """Return the base with the common differences that the recording needs."""
-        chosen = self.chosen([c for c in causes if c.common])
+        chosen = self.chosen(causes)
         if not chosen or self.fits():
             return self.base
-        model = self.sparse(self.begun(self.needed(self.acting(self.fitted(chosen)))))
+        model = self.needed(self.acting(self.fitted(chosen)))
+        model = self.with_needed_forms(self.sparse(self.begun(model)), causes)
         if len(model.fit.frees) > len(self.base.fit.frees):
             model = refit(self.problem, self.blocks, model, 2)
         model = self.anchored(model)
@@ -336,6 +341,29 @@ class FlexibleBase:
         kept &= np.array([f.name not in idle for f in fit.frees])
         smaller = self.reduced(model, kept, z, SPARSE_ROUNDS)
         return smaller if self.blocks.gain(smaller.errors, model.errors) < SPARSE_LOSS else model
+
+    def with_needed_forms(self, model: Candidate, asked: Sequence[Cause]) -> Candidate:
+        """Return a model without those forms of its differences that it hardly needs."""
+        present = set(model.names)
+        for cause in (c for c in asked if c.name in present and c.name not in self.shown):
+            for form in cause.forms if len(cause.forms) > 1 else ():
+                names = [f.name for f in model.fit.frees]
+                group = [names.index(t.name) for t in form.terms if t.name in names]
+                if not group or not any(t.amount and t.name in names for t in form.terms):
+                    continue
+                complete_jacobian(self.problem, model.fit)
+                normal, _ = lsq.normal_equations(self.problem, model.fit)
+                columns = np.linalg.pinv(normal, hermitian=True)[group]
+                off = model.fit.z[group] - self.plain(model.fit)[group]
+                if not np.isfinite(off).all():
+                    continue
+                z = model.fit.z - columns.T @ np.linalg.pinv(columns[:, group]) @ off
+                kept = np.ones(len(names), bool)
+                kept[group] = False
+                smaller = self.reduced(model, kept, z, SPARSE_ROUNDS)
+                if self.blocks.gain(smaller.errors, model.errors) < SPARSE_LOSS:
+                    model = smaller
+        return model
 
     def reduced(self, model: Candidate, kept: Flags, z: Array, rounds: int) -> Candidate:
         """Return a model fitted without some of its parameters, which take the plain values.

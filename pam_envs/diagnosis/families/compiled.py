@@ -14,7 +14,7 @@ from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import MANY_CYCLES, SHUT_SECONDS, longest_shut
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.calibrate import Calibration, simplest, start_at_guess
+from pam_envs.diagnosis.fit.calibrate import Calibration
 from pam_envs.diagnosis.fit.candidate import fit_base
 from pam_envs.diagnosis.fit.least_squares import (
     LANES,
@@ -24,6 +24,7 @@ from pam_envs.diagnosis.fit.least_squares import (
     column_of,
     no_violations,
 )
+from pam_envs.diagnosis.fit.regulator_kind import simplest, start_at_guess
 from pam_envs.diagnosis.fit.single_muscle import CLOCK, PILOT, SETTINGS, clock_free, identified
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.parameters import Declaration
@@ -370,4 +371,4 @@ def calibrate_compiled(
     if wide:
         # not from the fit, which a large difference of the muscles may have led astray
         guesses.append(family.flexible_guess({**{f.name: f.start for f in usual}, **wide}))
-    return Calibration(family, problem, base, tuple(guesses), None, linear=family.linear)
+    return Calibration(family, problem, base, tuple(guesses), {}, linear=family.linear)

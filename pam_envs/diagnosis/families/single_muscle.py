@@ -142,5 +142,6 @@ class MuscleKind:
         shapes: Array,
     ) -> Calibration:
         """Fit regulator, static law and friction in stages."""
-        rates = by_name("slew_limit").forms
-        return calibrate(family, measured, noise, blocks, time, shapes, rates)
+        limit = by_name("slew_limit")
+        causes = [c for c in catalogue() if not c.common]
+        return calibrate(family, measured, noise, blocks, time, shapes, limit, causes)

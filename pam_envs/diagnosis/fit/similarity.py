@@ -32,7 +32,7 @@ EXPONENTS = {
     "1/N^0.5": (-0.5, 0.0),
     "Pa/N2": (-2.0, 1.0),
     "m3/(s Pa)": (1.0, -1.0),
-    **dict.fromkeys(("1", "s", "m", "rad", "1/s", "Hz", "K", "1/K", "m/s"), (0.0, 0.0)),
+    **dict.fromkeys(("1", "s", "m", "rad", "1/s", "1/s2", "Hz", "K", "1/K", "m/s"), (0.0, 0.0)),
 }
 """Exponents of force and pressure in each unit of a parameter of the single muscle."""
 KEPT = 4.0

@@ -38,6 +38,9 @@ map over that of the groups, and range of the checks without pressure over the r
 YIELD = "muscle.yield_force"
 BORE = "muscle.diameter"
 """Size of the enclosed volume at rest; the force law gives how it grows."""
+SPEEDS = tuple(f"regulator.speed_{share}" for share in (2, 6, 20, 60))
+"""Characteristic of the valve: rate over error, by the error in percent of full pressure."""
+INTEGRAL = ("regulator.integral", "regulator.integral_release")
 START = "hysteresis.start"
 """Friction when the recording starts: of the recording, not of the plant."""
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -60,9 +63,13 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.exhaust_share": {"log": True, "prior": 1.5},
     "regulator.critical_ratio": {"scale": 0.1, "prior": 3.0},
     "regulator.opening_band": {"log": True, "prior": 2.0},
+    "regulator.opening_bend": {"scale": 0.2, "prior": 3.0},
     "regulator.source_pressure": {"log": True, "prior": 0.5},
     "regulator.pilot_lag": {"log": True, "low": 2e-3, "prior": 2.0},
     "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
+    "regulator.integral": {"high": 1e3, "scale": 10.0, "prior": 10.0},
+    "regulator.integral_release": {"log": True, "prior": 2.0},
+    **{name: {"log": True, "low": 0.03, "high": 10.0, "prior": 1.5} for name in SPEEDS},
 }
 """Base parameters with the settings of their fits that differ from the declarations."""
 USUAL = {
@@ -84,6 +91,7 @@ ORIFICES = {
     "regulator.exhaust_share": 1.0,
     "regulator.critical_ratio": 0.3,
     "regulator.opening_band": 4e4,
+    "regulator.opening_bend": 0.0,
     "regulator.source_pressure": 8e5,
 }
 """Parameters of a regulator with flow through its orifices, with their starting values."""
@@ -92,7 +100,9 @@ SOURCE, LEAST_SOURCE = "regulator.source_pressure", 1.001
 LAG = "regulator.time_constant"
 PILOT = {"regulator.pilot_lag": 0.02, "regulator.pilot_damping": 1.0}
 """Starting values of the pilot stage of a regulator of second order."""
-BASE = tuple(name for name in SETTINGS if name not in {*PILOT, *ORIFICES, BORE, START})
+BASE = tuple(
+    name for name in SETTINGS if name not in {*PILOT, *INTEGRAL, *ORIFICES, *SPEEDS, BORE, START}
+)
 CLOCK = "clock.offset"
 """Time [s] by which the readings lag the command: no parameter of the plant."""
 USUAL_ROWS = 2.5

@@ -1,0 +1,406 @@
+"""Kind of pressure regulator that a recording shows, selected by its pressure alone.
+
+An effect of the valve that acts in the recording makes one kind look like another. Dead time, leak
+and slower exhaust are therefore free while a kind is selected, and a kind beyond the lags of first
+and second order has to gain over these together with any one effect.
+"""
+
+import dataclasses
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from pam_envs.arrays import Array
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.candidate import frees_for, restarted
+from pam_envs.diagnosis.fit.least_squares import (
+    FEW_DAMPINGS,
+    Fit,
+    Free,
+    Problem,
+    column_of,
+    evaluate,
+    improve,
+    near,
+    no_violations,
+    promising,
+)
+from pam_envs.diagnosis.fit.single_muscle import (
+    BORE,
+    CLOCK,
+    INTEGRAL,
+    ORIFICES,
+    PILOT,
+    SPEEDS,
+    MuscleFamily,
+)
+from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.pneumatics.flow import AIRS, REPLACED, SWITCH
+
+FINE_STEP = 0.0101
+"""Longest step [s] of a replay with flow through orifices, or a fast regulator."""
+RACE, GUESS_ROUNDS, LONG_ROUNDS = 2, 6, 12
+"""Rounds after which only fits near the best one continue, and rounds of each stage."""
+ORDER_GAIN = 0.05
+"""Gain on held-out pressures that a regulator of higher order needs."""
+FITS = 1.2
+"""Mean square of the pressure's residual over its noise below which no further kind is tried."""
+KIND_GAIN, TAIL_GAIN = 0.2, 0.3
+"""Gain that a further kind needs over the lags with one effect, and the slow tail."""
+SHOWN_GAIN, CLOSE, MOST_SHOWN = 0.5, 0.7, 3
+"""Gain from which the pressure shows an effect, share of it that no other may reach, and number."""
+PRESSURE, READING = ("regulator.", "pressure."), "pressure."
+TAIL, TAIL_FREQUENCY = "regulator.ring_share", "regulator.ring_frequency"
+TAIL_DAMPING = 2.0
+"""Damping ratio with which the line of a regulator gives a slow share of the pressure."""
+TAIL_FREQUENCIES, TAIL_FASTEST = (0.6, 1.0), 2.0
+"""Frequencies [Hz] at which a fit of that share starts, and the largest one."""
+DELAY, LEAK = 0.02, 0.005
+"""Dead time [s] and leak [1/s] at which a fit starts."""
+CONDUCTANCES = (1e-10, 8e-10)
+"""Conductances [m3/(s Pa)] at which a fit starts."""
+INTEGRALS, RELEASES = (10.0, 40.0), (0.1, 0.5)
+"""Gain [1/s2] and release time [s] of an integral part at which a fit starts."""
+CHARACTERISTICS = ((0.95, 0.9, 0.8, 0.6), (0.7, 0.5, 0.3, 0.15), (1.3, 1.6, 1.8, 1.9))
+"""Rates over error, of large errors over small ones, at which a fit starts."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Fits of the kinds of regulator of a family to the pressure alone."""
+
+    problem: Problem
+    family: MuscleFamily
+    blocks: Blocks
+    limit: Cause  # a limited rate, which the lags may have
+    causes: Sequence[Cause]  # others that may act on the pressure, or on its reading
+    # gives parameters of the static law, with which orifices fill the volume of the muscle
+    law: Callable[[MuscleFamily], Mapping[str, float]]
+
+    def selected(self) -> tuple[MuscleFamily, Fit, dict[str, Form]]:
+        """Return the family with the regulator that the pressure needs, its fit, and effects.
+
+        The regulator is a lag of first or second order. If that lacks something: a lag with a slow
+        tail, one whose rate is no multiple of the error, one with an integral part, or orifices.
+        The effects are the forms of causes that the pressure clearly shows, as a limited rate.
+        """
+        family, fit = self.kind()
+        return family, *self.of(family).with_shown_effects(fit)
+
+    def kind(self) -> tuple[MuscleFamily, Fit]:
+        """Return the family with the kind of regulator, and its fit with the effects aside."""
+        family, fit = self.lags()
+        if not self.lacks(fit):
+            return family, fit
+        reached = self.of(family).with_one_effect(fit)
+        best = family, fit
+        further = (
+            (self.slow_tail, TAIL_GAIN),
+            (self.characteristic, KIND_GAIN),
+            (self.integral, KIND_GAIN),
+            (self.orifices, KIND_GAIN),
+        )
+        for kind, least in further:
+            if not self.lacks(reached):
+                break
+            for other, made in kind(family, fit):
+                if self.gain(reached, made) >= least:
+                    best, reached = (other, made), made
+        return best
+
+    def lags(self) -> tuple[MuscleFamily, Fit]:
+        """Return the family with a lag of first or second order and its fit."""
+        family = self.family
+        lag = (*regulator_of(family), *self.aside(family))
+        known = {f.name for f in lag}
+        flows = family.plant.air == "flow"
+        orders = [lag] if flows or known & set(PILOT) else [lag, (*lag, *pilot_of(family))]
+        limits: list[tuple[Free, ...]] = [()]
+        for form in self.limit.forms:
+            if not flows and not any(t.name in known for t in form.terms):
+                limits += [frees_for(family, form, values) for values in form.starts]
+        fits = [Fit.at_start((*o, *limit), family.column) for o in orders for limit in limits]
+        chosen = self.simplest(fits, LONG_ROUNDS)
+        return with_values(family, chosen, PILOT), chosen
+
+    def aside(self, family: MuscleFamily) -> tuple[Free, ...]:
+        """Return effects that are free while a kind is selected, unless the base holds them.
+
+        The leak is one where the valve is shut in some samples.
+        """
+        starts = {"regulator.dead_time": {"start": DELAY}}
+        if family.plant.air != "flow":
+            starts["regulator.exhaust_ratio"] = {"start": 1.0, "log": True}
+        if np.any(family.inputs.command < 0.0):
+            starts["regulator.leak"] = {"start": LEAK, "scale": LEAK}
+        known = {free.name for free in family.base()}
+        return tuple(family.free(n, **given) for n, given in starts.items() if n not in known)
+
+    def with_effects(self, fit: Fit) -> dict[str, tuple[Form, Fit]]:
+        """Return the best form of each cause that a regulator's fit lacks, and the fit with it."""
+        known, fits = {f.name for f in fit.frees}, []
+        for cause in self.causes:
+            for form in filter(self.acts, cause.forms):
+                for values in form.starts if not any(t.name in known for t in form.terms) else ():
+                    frees = frees_for(self.family, form, values)
+                    z = np.concatenate([fit.z, [f.inner(f.start) for f in frees]])
+                    more = restarted(fit, frees=(*fit.frees, *frees), z=z, shared=None)
+                    fits.append((cause.name, form, more))
+        evaluate(self.only, [more for *_, more in fits])
+        for rounds in (RACE, GUESS_ROUNDS):
+            improve(self.only, [more for *_, more in fits], rounds, 1e-4, FEW_DAMPINGS)
+            best = {n: min(m.cost for name, _, m in fits if name == n) for n, *_ in fits}
+            fits = [made for made in fits if made[2].cost == best[made[0]]]
+        return {name: (form, more) for name, form, more in fits}
+
+    def acts(self, form: Form) -> bool:
+        """Return whether a form acts on the pressure alone, and on this kind of regulator."""
+        flows = self.family.plant.air == "flow"
+        replaced = {f"regulator.{name}" for name in REPLACED} if flows else set()
+        shut = bool(np.any(self.family.inputs.command < 0.0))
+        names = {t.name for t in form.terms}
+        return (
+            all(t.name.startswith(PRESSURE) for t in form.terms if t.amount)
+            and not names & replaced
+            and (shut or "regulator.leak" not in names)
+        )
+
+    def with_one_effect(self, fit: Fit) -> Fit:
+        """Return the best fit of a regulator with one further effect, or without."""
+        made = [more for _, more in self.with_effects(fit).values()]
+        return min((fit, *made), key=lambda f: -self.gain(fit, f))
+
+    def with_shown_effects(self, fit: Fit) -> tuple[Fit, dict[str, Form]]:
+        """Return a fit with the effects that the pressure clearly shows, and their forms by cause.
+
+        Each gains clearly more than any other one.
+        """
+        fit, shown = self.with_limit(fit)
+        while len(shown) < MOST_SHOWN and self.lacks(fit):
+            found = self.with_effects(fit)
+            gains = sorted((self.gain(fit, more), name) for name, (_, more) in found.items())
+            if not gains or gains[-1][0] < SHOWN_GAIN:
+                break
+            name = gains[-1][1]
+            form, more = found[name]
+            alone = len(gains) < 2 or gains[-2][0] < CLOSE * gains[-1][0]
+            if not alone or any(t.name.startswith(READING) for t in form.terms):
+                break
+            fit, shown[name] = self.spare(more, form)
+        return fit, shown
+
+    def with_limit(self, fit: Fit) -> tuple[Fit, dict[str, Form]]:
+        """Return a fit without other effects than a limit of its rate that it needs."""
+        known = fit.values()
+        form = next((f for f in self.limit.forms if all(t.name in known for t in f.terms)), None)
+        less = self.without(fit, ())
+        if form is None:
+            return less, {}
+        limited = self.without(fit, form.terms)
+        if self.gain(less, limited) < KIND_GAIN:
+            return less, {}
+        limited, form = self.spare(limited, form)
+        return limited, {self.limit.name: form}
+
+    def without(self, fit: Fit, terms: Sequence[Term]) -> Fit:
+        """Return the fit of a regulator with no other effects than some terms."""
+        kept = {f.name for f in regulator_of(self.family)} | {t.name for t in terms}
+        return self.less(fit, [f.name for f in fit.frees if f.name not in kept])
+
+    def less(self, fit: Fit, names: Collection[str]) -> Fit:
+        """Return a fit without some parameters, which take the values of the plant."""
+        frees = tuple(f for f in fit.frees if f.name not in names)
+        z = np.array([v for f, v in zip(fit.frees, fit.z, strict=True) if f.name not in names])
+        made = restarted(fit, frees=frees, z=z, column=self.family.column, shared=None)
+        evaluate(self.only, [made])
+        return self.simplest([made], LONG_ROUNDS)
+
+    def spare(self, fit: Fit, form: Form) -> tuple[Fit, Form]:
+        """Return a fit without those terms that only shape an effect and that it does not need."""
+        terms = form.terms
+        for term in terms:
+            if not term.amount:
+                less = self.less(fit, [term.name])
+                if self.gain(less, fit) < ORDER_GAIN:
+                    fit, terms = less, tuple(t for t in terms if t is not term)
+        return fit, dataclasses.replace(form, terms=terms)
+
+    def slow_tail(self, family: MuscleFamily, fit: Fit) -> Iterator[tuple[MuscleFamily, Fit]]:
+        """Yield the lag with a share of the pressure that follows slowly.
+
+        Air that flows into dead volumes, or an integrating pilot, gives such a tail.
+        """
+        plant = family.plant
+        if any(plant.value(name) != plant.neutral[name] for name in (TAIL, "regulator.ring_flow")):
+            return
+        overdamped = {"regulator.ring_damping": TAIL_DAMPING}
+        other = dataclasses.replace(family, plant=plant.replace(overdamped))
+        column = column_of(fit, fit.z)
+        column[R.place("regulator.ring_damping")] = TAIL_DAMPING
+        frees = start_at_guess(fit.frees, fit.values())
+        share = other.free(TAIL, start=0.05, high=0.5, scale=0.02)
+        fits = []
+        for hertz in TAIL_FREQUENCIES:
+            turns = other.free(TAIL_FREQUENCY, start=hertz, high=TAIL_FASTEST, log=True)
+            fits.append(Fit.at_start((*frees, share, turns), column))
+        made = self.simplest(fits)
+        yield with_values(other, made, (TAIL, TAIL_FREQUENCY)), made
+
+    def characteristic(self, family: MuscleFamily, fit: Fit) -> Iterator[tuple[MuscleFamily, Fit]]:
+        """Yield the lag, of first or second order, whose rate is no multiple of the error."""
+        plant = family.plant
+        if plant.air == "flow" or any(plant.value(n) != plant.neutral[n] for n in SPEEDS):
+            return
+        given = dict(zip(SPEEDS, CHARACTERISTICS[0], strict=True))
+        other = dataclasses.replace(family, plant=plant.replace(given)).finer(FINE_STEP)
+        fits = []
+        for speeds in CHARACTERISTICS:
+            begin = fit.values() | dict(zip(SPEEDS, speeds, strict=True))
+            frees = start_at_guess((*regulator_of(other), *self.aside(other)), begin)
+            known = {f.name for f in frees}
+            fits.append(Fit.at_start(frees, other.column))
+            if not known & set(PILOT):
+                fits.append(Fit.at_start((*frees, *pilot_of(other)), other.column))
+        made = self.of(other).simplest(fits, LONG_ROUNDS)
+        yield with_values(other, made, (*SPEEDS, *PILOT)), made
+
+    def integral(self, family: MuscleFamily, fit: Fit) -> Iterator[tuple[MuscleFamily, Fit]]:
+        """Yield the lag with a controller that also has an integral part."""
+        plant = family.plant
+        if plant.air == "flow" or plant.regulator.integral != 0.0:
+            return
+        other, column = family.finer(FINE_STEP), column_of(fit, fit.z)
+        frees = start_at_guess(fit.frees, fit.values())
+        fits = []
+        for rate, release in product(INTEGRALS, RELEASES):
+            gain = other.free(INTEGRAL[0], start=rate)
+            time = other.free(INTEGRAL[1], start=release)
+            fits.append(Fit.at_start((*frees, gain, time), column))
+        made = self.of(other).simplest(fits, LONG_ROUNDS)
+        yield with_values(other, made, INTEGRAL), made
+
+    def orifices(self, family: MuscleFamily, fit: Fit) -> Iterator[tuple[MuscleFamily, Fit]]:
+        """Yield the plant with flow through orifices.
+
+        The muscle, whose volume is filled, is that of the family or one with another law.
+        """
+        if not can_flow(self.family):
+            return
+        other = dataclasses.replace(family, plant=orifices_of(family.plant)).finer(FINE_STEP)
+        law = self.law(family)
+        full = family.plant.regulator.max_pressure
+        columns = [other.column, column_with(other, law)] if law else [other.column]
+        fits = []
+        for size, source in product(CONDUCTANCES, (1.05 * full, 1.5 * full)):
+            begin = {"regulator.conductance": size, "regulator.source_pressure": source}
+            frees = start_at_guess((*regulator_of(other), *self.aside(other)), begin)
+            fits += [Fit.at_start(frees, column) for column in columns]
+        of = self.of(other)
+        yield other, of.simplest(promising(of.only, fits), LONG_ROUNDS)
+
+    def of(self, family: MuscleFamily) -> "Selection":
+        """Return the selection with the simulation of another family."""
+        return dataclasses.replace(self, family=family)
+
+    @cached_property
+    def only(self) -> Problem:
+        """The problem of fitting the pressure alone."""
+        alone = self.problem.measured.copy()
+        alone[0] = np.nan
+        return dataclasses.replace(
+            self.problem,
+            measured=alone,
+            simulate=self.family.simulate,
+            tie=self.family.tie,
+            violations=no_violations,
+            checks=0,
+        )
+
+    def lacks(self, fit: Fit) -> bool:
+        """Return whether a regulator leaves more of the pressure than noise."""
+        left = self.blocks.errors(self.only.rows(fit.residual))
+        return bool(self.blocks.means(left)[1] >= FITS)
+
+    def gain(self, before: Fit, after: Fit) -> float:
+        """Return the gain of a fit over another one."""
+        rows = (self.only.rows(fit.residual) for fit in (before, after))
+        return self.blocks.gain(*map(self.blocks.errors, rows))
+
+    def simplest(self, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
+        """Return the best of some fits; one with more parameters needs a gain."""
+        return simplest(self.only, self.blocks, fits, rounds)
+
+
+def regulator_of(family: MuscleFamily) -> tuple[Free, ...]:
+    """Return the free parameters of the regulator and the clock."""
+    every = family.base()
+    return tuple(f for f in every if f.name.startswith("regulator.") or f.name in (BORE, CLOCK))
+
+
+def pilot_of(family: MuscleFamily) -> tuple[Free, ...]:
+    """Return the free parameters of the pilot stage of a second-order lag."""
+    return tuple(family.free(name, start=start) for name, start in PILOT.items())
+
+
+def with_values(family: MuscleFamily, fit: Fit, names: Collection[str]) -> MuscleFamily:
+    """Return the family whose plant has some parameters of a fit, as far as they are free in it."""
+    values = {name: value for name, value in fit.values().items() if name in names}
+    return dataclasses.replace(family, plant=family.plant.replace(values)) if values else family
+
+
+def simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
+    """Return the best of some fits; one with more parameters needs a gain."""
+    evaluate(problem, [fit for fit in fits if not len(fit.residual)])
+    improve(problem, fits, RACE, 1e-4, FEW_DAMPINGS)
+    improve(problem, near(fits), rounds - RACE, 1e-4, FEW_DAMPINGS)
+    errors = [blocks.errors(problem.rows(fit.residual)) for fit in fits]
+    chosen = 0
+    for k in range(1, len(fits)):
+        more = len(fits[k].frees) > len(fits[chosen].frees)
+        if blocks.gain(errors[chosen], errors[k]) > (ORDER_GAIN if more else 0.0):
+            chosen = k
+    return fits[chosen]
+
+
+def column_with(family: MuscleFamily, law: Mapping[str, float]) -> Array:
+    """Return the column of a family with some parameters, within their bounds."""
+    column = family.column
+    for name, value in law.items():
+        free = family.free(name)
+        column[free.place] = free.within(value)
+    family.tie(column[None])
+    return column
+
+
+def can_flow(family: MuscleFamily) -> bool:
+    """Return whether flow through orifices may replace the regulator of a family's plant."""
+    plant = family.plant
+    return (
+        plant.air != "flow"
+        and not plant.flowless
+        and all(
+            plant.value(f"regulator.{name}") == plant.neutral[f"regulator.{name}"]
+            for name in REPLACED
+            if name != "pilot_lag" and f"regulator.{name}" in plant.neutral
+        )
+    )
+
+
+def orifices_of(plant: SingleMuscle) -> SingleMuscle:
+    """Return a plant with flow through orifices at their starting values, without a pilot."""
+    source = max(ORIFICES["regulator.source_pressure"], 1.2 * plant.regulator.max_pressure)
+    values = {**ORIFICES, "regulator.source_pressure": source, "regulator.pilot_lag": 0.0}
+    return plant.replace_with_substeps({**values, SWITCH: float(AIRS.index("flow"))})
+
+
+def start_at_guess(frees: tuple[Free, ...], found: dict[str, float]) -> tuple[Free, ...]:
+    """Return free parameters that start at the guess, within their bounds."""
+    return tuple(
+        dataclasses.replace(f, start=f.within(found[f.name])) if f.name in found else f
+        for f in frees
+    )
