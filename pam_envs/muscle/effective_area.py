@@ -64,8 +64,7 @@ class EffectiveAreaMuscle(
         ("load_stiffening_root",),
         ("strand_1", "strand_2", "strand_3", "strand_4", "strand_break", "strand_per_pressure"),
         ("yield_force", "yield_per_pressure", "yield_break", "yield_ratio", "yield_tail"),
-        ("viscosity", "viscosity_speed"),
-        ("viscosity_per_pressure", "viscosity_relaxing"),
+        *ViscosityEffects.effects,
         MAP._fields,
     )
 

@@ -8,7 +8,7 @@ from pam_envs.constants import ROOM_TEMPERATURE
 from pam_envs.kernels.arithmetic import count_on
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.kernels.yielding import deflected_with_tail
-from pam_envs.parameters import assumed, declarations, effect, named_rows
+from pam_envs.parameters import assumed, declarations, effect, named_rows, parameter_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,19 +45,32 @@ def stiffening(weight: float, linear: float, square: float, root: float) -> floa
 
 @dataclass(frozen=True, kw_only=True)
 class ViscosityEffects:
-    """Damping beside the mass's: at small speeds, and that grows with the pressure.
+    """Damping beside that of the load: at small speeds, and that grows with the pressure.
 
     The damping of a muscle grows with its pressure, and is smaller in relaxation (reynolds2003).
     """
 
-    viscosity: float = effect("N s/m", 0.0, 1e5, "damping at small speed beside the mass's")
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("viscosity", "viscosity_speed"),
+        ("viscosity_per_pressure", "viscosity_relaxing"),
+    )
+
+    viscosity: float = effect("N s/m", 0.0, 1e5, "damping at small speed beside the load's")
     viscosity_speed: float = assumed(0.02, "m/s", 1e-4, 10.0, "speed that lowers it by 1 / sqrt(2)")
     viscosity_per_pressure: float = effect(
-        "N s/(m Pa)", 0.0, 1.0, "damping over effective pressure, beside the mass's"
+        "N s/(m Pa)", 0.0, 1.0, "damping over effective pressure, beside the load's"
     )
     viscosity_relaxing: float = assumed(
         1.0, "1", 0.0, 2.0, "viscosity_per_pressure in relaxation over contraction", neutral=1.0
     )
+
+    def damping_at_rest(self, pressure: float) -> float:
+        """Return the damping [N s/m] of small contractions at an effective pressure [Pa]."""
+        return self.viscosity + self.viscosity_per_pressure * pressure
+
+
+VISCOSITY = parameter_rows(ViscosityEffects)
+"""Rows of a muscle's viscosity, from its first."""
 
 
 @kernel
@@ -67,6 +80,26 @@ def viscous_damping(
     """Return the damping [N s/m] at a speed of contraction [m/s] and an effective pressure [Pa]."""
     grown = per_pressure * max(0.0, drive) * (relaxing if speed < 0.0 else 1.0)
     return viscosity / math.sqrt(1.0 + abs(speed) / pace) + grown
+
+
+@kernel
+def taut_damping(fixed: Any, j: int, first: int, speed: float, drive: float, force: float) -> float:
+    """Return :func:`viscous_damping` [N s/m] of a muscle whose force [N] without it is known.
+
+    A slack muscle has none, and a quick contraction has at most what takes all the force.
+    ``first`` is the first row of :class:`ViscosityEffects`.
+    """
+    damping = viscous_damping(
+        fixed[first + VISCOSITY.viscosity][j],
+        fixed[first + VISCOSITY.viscosity_speed][j],
+        fixed[first + VISCOSITY.viscosity_per_pressure][j],
+        fixed[first + VISCOSITY.viscosity_relaxing][j],
+        speed,
+        drive,
+    )
+    if damping * speed > force:
+        damping = force / speed
+    return damping if force > 0.0 else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,16 +14,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
-from pam_envs.muscle.effects import TemperatureEffects
+from pam_envs.muscle.effects import TemperatureEffects, ViscosityEffects
 from pam_envs.muscle.law_correction import FIELDS, LawCorrection
 from pam_envs.parameters import assumed, derived
 
 
 @dataclass(frozen=True)
-class GasSpring(LawCorrection, TemperatureEffects):
+class GasSpring(LawCorrection, ViscosityEffects, TemperatureEffects):
     """The muscle of the orthosis; inverses of its law do not use the correction."""
 
-    effects: ClassVar[tuple[tuple[str, ...], ...]] = (*TemperatureEffects.effects, FIELDS)
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        *TemperatureEffects.effects,
+        *ViscosityEffects.effects,
+        FIELDS,
+    )
 
     shortest_length: float = assumed(0.17, "m", 0.02, 1.0, "L_min: 5 cm below yeh2010's nominal")
     gain: float = assumed(

@@ -15,13 +15,15 @@ counted from that of ideal braided muscles at their nominal length.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pam_envs.arrays import Array
 from pam_envs.kernels.build import kernel
-from pam_envs.muscle.effects import TemperatureEffects
+from pam_envs.muscle.effects import TemperatureEffects, ViscosityEffects
+from pam_envs.muscle.law_correction import FIELDS, LawCorrection
 from pam_envs.parameters import assumed, published
 
 _FIT = "chakarov2018, Eq. (6)"
@@ -108,6 +110,17 @@ class QuadraticBundle(TemperatureEffects):
         c = np.asarray(contraction, float)
         grown = grown_volume(c, self.nominal_length, self.reach)  # type: ignore[arg-type]
         return np.asarray(self.nominal_volume + self.pressure_factor * grown)
+
+
+@dataclass(frozen=True)
+class BundleMuscle(LawCorrection, ViscosityEffects):
+    """Effects of each muscle of a bundle, at its strain over the nominal length.
+
+    A bundle has them times the number of its muscles; the correction is also times its ``gain``.
+    Inverses of the law and the volume do not use the correction.
+    """
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (*ViscosityEffects.effects, FIELDS)
 
 
 @kernel

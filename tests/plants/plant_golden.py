@@ -91,13 +91,13 @@ def joint(make: Any, kind: Any, **extra: Any) -> Signals:
     return moved
 
 
-def elbow(kind: Any, valves: Any) -> Signals:
+def elbow(kind: Any, valves: Any, **changes: float) -> Signals:
     wide = (0.02, 0.04) if valves == "on_off" else (5e4, 4e5)
     command = np.stack([wave(*wide), wave(*wide, lead=0.3)], axis=1)
     if valves == "on_off":
         command -= 0.03
     return simulate_elbow(
-        ElbowOrthosis.paper(kind, valves), command, intent=(wave(0.8, 1.4), 0.1, 0.0),
+        ElbowOrthosis.paper(kind, valves, **changes), command, intent=(wave(0.8, 1.4), 0.1, 0.0),
         disturbance=0.2,
     )  # fmt: skip
 
@@ -128,6 +128,14 @@ def cases() -> dict[str, Callable[[], Signals]]:
         for valves in ("proportional", "on_off"):
             found[f"elbow/{valves}/{kind}"] = partial(elbow, kind, valves)
         found[f"arm/{kind}"] = partial(arm, kind)
+    drag = {"muscle__viscosity": 300.0, "muscle__viscosity_per_pressure": 1e-3}
+    law = {"muscle__map_02": 1.0, "muscle__map_13": -0.5, "muscle__map_20": 1.0}
+    for name in ("no_load", "on_leg"):
+        make = getattr(KneeOrthosis, name)
+        found[f"knee/{name}/viscous"] = partial(knee, make, "maxwell_slip", **drag)
+    for valves in ("proportional", "on_off"):
+        made = partial(elbow, "maxwell_slip_length", valves, **drag, **law)
+        found[f"elbow/{valves}/viscous_and_corrected"] = made
     return found
 
 

@@ -62,7 +62,20 @@ class Model:
         torque = float(plant.torque(q, p_a, p_b)) + float(np.interp(t, self.times, self.drive))
         torque -= (self.own + link.mass * link.centre * link.gravity) * np.sin(q)
         torque -= wearer.stiffness * q + (wearer.damping + link.damping) * rate
+        torque -= self.viscous(q, rate, p_a, p_b)
         return torque / (link.inertia + wearer.inertia)
+
+    def viscous(self, q: float, rate: float, p_a: float, p_b: float) -> float:
+        """Return the torque [N m] by which the muscles' viscosity resists the motion."""
+        muscle, radius, total = self.plant.muscle, self.plant.pulley.radius, 0.0
+        forces = self.plant.forces(q, p_a, p_b)
+        for bundle, p, force, sign in zip(self.bundles, (p_a, p_b), forces, (-1, 1), strict=True):
+            speed = sign * radius * rate
+            share = muscle.viscosity_relaxing if speed < 0.0 else 1.0
+            drag = muscle.viscosity_per_pressure * p * share
+            drag += muscle.viscosity / np.sqrt(1.0 + abs(speed) / muscle.viscosity_speed)
+            total += sign * radius * min(float(force), bundle.muscles * drag * speed)
+        return total
 
     def run(self, rate: object, start: list[float]) -> Array:
         made, state = [], np.array(start)
@@ -73,10 +86,23 @@ class Model:
         return np.array(made)
 
 
-def test_the_forearm_follows_its_differential_equation() -> None:
-    plant, n = ElbowOrthosis.paper("none").with_lag_alone(), 150
+VISCOUS = {
+    "muscle.viscosity": 600.0,
+    "muscle.viscosity_per_pressure": 2e-3,
+    "muscle.viscosity_relaxing": 0.5,
+}
+CORRECTED = {"muscle.map_02": 2.0, "muscle.map_13": -2.0, "muscle.map_20": 3.0}
+
+
+@pytest.mark.parametrize("changes", [{}, VISCOUS, CORRECTED], ids=["plain", "viscous", "map"])
+def test_the_forearm_follows_its_differential_equation(changes: dict[str, float]) -> None:
+    plant, n = ElbowOrthosis.paper("none").with_lag_alone().replace(changes), 150
+    if changes == VISCOUS:  # the damping is that of the speed before a sub-step
+        plant = dataclasses.replace(plant, substeps=40)
     intent, commands = reach(n), steps(n, 0.5e5, 5.5e5, every=25)
     made = simulate_elbow(plant, commands, intent=intent)
+    plain = simulate_elbow(plant.replace(plant.neutral), commands, intent=intent)
+    assert (np.abs(made["angle"] - plain["angle"]).max() > 5e-3) == bool(changes)
     model = Model(plant, intent)
 
     def rate(t: float, state: Array) -> list[float]:

@@ -1,4 +1,4 @@
-"""Yielding friction of the bundles of the elbow orthosis, for both drives of the hysteresis."""
+"""Forces of the bundles of the elbow orthosis: yielding friction, viscosity, correction."""
 
 import numpy as np
 import pytest
@@ -66,3 +66,23 @@ def test_friction_lowers_the_force_of_the_bundle_that_contracts(motion):
         quick[:SETTLED] = False
         along = np.sign(speed[quick]) * friction[m, quick]
         assert along.mean() > 0.5 * bundle.muscles * plant.hysteresis.yield_force
+
+
+@pytest.mark.parametrize("kind", ["none", "maxwell_slip", "maxwell_slip_length"])
+def test_force_of_a_bundle_lacks_that_of_the_viscosity_of_its_muscles(kind):
+    plain = ElbowOrthosis.paper(kind).with_lag_alone().replace({"hysteresis.loop": 0.0})
+    viscous = {"muscle.viscosity_per_pressure": 2e-3, "muscle.viscosity_relaxing": 0.5}
+    plant = plain.replace({**viscous, "muscle.map_02": 1.0, "muscle.map_20": 2.0})
+    swing = 0.6e5 * np.sin(2.0 * np.pi * np.arange(200) / 100)
+    commands = np.stack([2e5 - swing, 1.2e5 + swing], axis=1)
+    made = simulate_elbow(plant, commands, intent=1.0, compiled=False)
+    assert not made["slack"].any()
+    speed = plant.pulley.radius * made["velocity"]
+    forces = plant.forces(made["angle"], made["pressure_a"], made["pressure_b"])
+    for side, bundle, force, sign in zip(
+        "ab", (plant.bundle_a, plant.bundle_b), forces, (-1, 1), strict=True
+    ):
+        share = np.where(sign * speed < 0.0, 0.5, 1.0)
+        lost = bundle.muscles * 2e-3 * made[f"pressure_{side}"] * share * sign * speed
+        assert np.ptp(lost) > 10.0
+        assert force - made[f"force_{side}"] == pytest.approx(lost, abs=1e-6)

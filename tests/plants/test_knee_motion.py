@@ -52,6 +52,11 @@ def integrated(plant: KneeOrthosis, set_points: np.ndarray, start: dict[str, flo
         theta = x + (lever.mount_angle + knee if worn else 0.0)
         length = 2.0 * lever.arm * np.sin(theta / 2.0) - lever.fittings
         tension = muscle.stiffness_ratio * p * max(0.0, length - muscle.shortest_length)
+        speed = -(v + rate) * lever.arm * np.cos(theta / 2.0)
+        grown = muscle.viscosity_per_pressure * p
+        grown *= muscle.viscosity_relaxing if speed < 0.0 else 1.0
+        viscous = muscle.viscosity / np.sqrt(1.0 + abs(speed) / muscle.viscosity_speed)
+        tension = max(0.0, tension - (viscous + grown) * speed) if tension > 0.0 else 0.0
         torque = tension * lever.arm * np.cos(theta / 2.0)
         torque -= lever.stiffness * (lever.relaxed_angle - theta)
         inertia, pull = lever.inertia, -torque - lever.damping * v
@@ -75,8 +80,25 @@ def integrated(plant: KneeOrthosis, set_points: np.ndarray, start: dict[str, flo
     return np.array(made)
 
 
-def test_the_brace_alone_follows_its_differential_equation() -> None:
+VISCOUS = {
+    "muscle.viscosity": 300.0,
+    "muscle.viscosity_per_pressure": 1e-3,
+    "muscle.viscosity_relaxing": 0.5,
+}
+
+
+def finer(plant: KneeOrthosis, changes: dict[str, float]) -> KneeOrthosis:
+    """Return a plant with effects, and sub-steps in which its speed hardly changes."""
+    return dataclasses.replace(plant.replace(changes), substeps=60 if changes else plant.substeps)
+
+
+EACH = pytest.mark.parametrize("changes", [{}, VISCOUS], ids=["plain", "viscous"])
+
+
+@EACH
+def test_the_brace_alone_follows_its_differential_equation(changes: dict[str, float]) -> None:
     plant, u = KneeOrthosis.no_load("none").with_lag_alone(), steps(120)
+    plant = finer(plant, changes)
     made = simulate_knee(plant, u, pressure=1e5)["angle"]
     x = float(plant.angle_at(plant.muscle.stiffness_ratio * 1e5))
     start = {"x": x, "pressure": 1e5, "phase": 0.0, "hold": [0.0], "hold_rate": [0.0]}
@@ -84,8 +106,10 @@ def test_the_brace_alone_follows_its_differential_equation() -> None:
     assert np.abs(made - truth).max() < 1e-4
 
 
-def test_the_brace_on_the_leg_follows_its_differential_equation() -> None:
+@EACH
+def test_the_brace_on_the_leg_follows_its_differential_equation(changes: dict[str, float]) -> None:
     plant, u = KneeOrthosis.on_leg("walk", 1.4, "none").with_lag_alone(), steps(100)
+    plant = finer(plant, changes)
     made = simulate_knee(plant, u, pressure=1e5, phase=0.55)
     rest = simulate_knee(plant, u[:1], pressure=1e5, phase=0.55 - 1e-9)
     hold = [np.concatenate([rest[name], made[name]]) for name in ("hold", "hold_rate")]

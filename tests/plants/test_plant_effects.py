@@ -270,7 +270,7 @@ def test_neutral_values_leave_the_plant_plain(name: str) -> None:
         declared = declarations(getattr(plant, part))[field]
         end = declared.high if declared.high > neutral else declared.low
         share = 1.0 if effect == SWITCH else 0.1
-        other = plant.replace({effect: neutral + share * (end - neutral)})
+        other = plant.replace_with_substeps({effect: neutral + share * (end - neutral)})
         assert other.extended and other.digest() != plant.digest(), effect
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.families.adapted import with_bearing, with_yielding
+from pam_envs.diagnosis.families.adapted import with_bearing, with_correction, with_yielding
 from pam_envs.diagnosis.families.antagonistic_joint import (
     LEAST_BREAK,
     PAIRS,
@@ -24,6 +24,7 @@ from pam_envs.diagnosis.families.antagonistic_joint import (
 from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
 from pam_envs.diagnosis.fit.least_squares import Free
+from pam_envs.diagnosis.fit.single_muscle import grouped
 from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.hysteresis import REFERENCE_PRESSURE, elbow_hysteresis
@@ -58,6 +59,11 @@ FURTHER = 1.001
 """Least contraction at which a bundle's force ends, over the stroke: just beyond it, as the plant
 demands."""
 BY_LENGTH, BY_PRESSURE = "maxwell_slip_length", "maxwell_slip"
+CORRECTED = (
+    *((0, 1), (0, 2), (0, 3), (1, 2), (1, 3)),
+    *((2, 0), (2, 1), (2, 2), (3, 0), (3, 1)),
+)
+"""Orders in pressure and strain of the terms that the law of the bundles lacks, up to order 4."""
 
 
 class BoundElbow(RegulatedFamily):
@@ -68,6 +74,48 @@ class BoundElbow(RegulatedFamily):
     )
     settings: ClassVar[Mapping[str, Mapping[str, Any]]] = SETTINGS
     pairs: ClassVar[Mapping[str, str]] = PAIRS
+    law: ClassVar[str] = "muscle"
+
+    @property
+    def abreast(self) -> float:
+        """Number of muscles of the smaller bundle."""
+        return float(min(self.plant.bundle_a.muscles, self.plant.bundle_b.muscles))
+
+    def recorded_states(self, measured: Array) -> Array:
+        """Return groups of pressures [Pa] and strains of both bundles, (2, k)."""
+        plant, place = self.plant, self.channels.index
+        contractions = plant.pulley.contractions(measured[place("angle")])
+        lengths = plant.bundle_a.nominal_length, plant.bundle_b.nominal_length
+        strains = np.concatenate([c / n for c, n in zip(contractions, lengths, strict=True)])
+        pressures = np.concatenate([measured[place(f"pressure_{side}")] for side in "ab"])
+        return grouped(strains, pressures, slack=False)
+
+    def law_slopes(self, columns: Array, pressure: Array, strain: Array) -> tuple[Array, ...]:
+        """Return slopes of the laws of columns (n, p), without correction, at states (k,).
+
+        Of as many muscles as the smaller bundle has; of both bundles the smaller slopes.
+        """
+        stiff, gain, usual = zip(
+            *(self._slopes(side, columns, pressure, strain) for side in "ab"), strict=True
+        )
+        return np.minimum(*stiff), np.minimum(*gain), np.minimum(*usual)
+
+    def _slopes(
+        self, side: str, columns: Array, pressure: Array, strain: Array
+    ) -> tuple[Array, Array, Array]:
+        def value(name: str) -> Array:
+            return columns[:, [self.plant.names.index(f"bundle_{side}.{name}")]]
+
+        muscles, length = value("muscles"), value("nominal_length")
+        part, reach = value("gain") * self.abreast / muscles, value("largest_contraction") * length
+        passive = value("passive_base") + value("passive_each") * muscles
+        pressed = part * (value("pressure_base") + value("pressure_each") * muscles)
+        contraction = length * strain
+        stiff = (
+            (part * passive + pressed * pressure) * length * (length + reach - 2.0 * contraction)
+        )
+        shape = (length - contraction) * (reach - contraction)
+        return stiff, pressed * shape, pressed * length * reach
 
     def tie(self, columns: Array) -> None:
         """Complete the largest lag of the hysteresis, to which ``hysteresis.loop`` refers."""
@@ -144,7 +192,9 @@ class ElbowKind(RegulatedKind):
     renamed = ({"position": "angle", "mass": "link"},)
     factors = FACTORS
     titles = TITLES
-    catalogue = with_yielding(with_bearing("link", BREAKS), "hysteresis")
+    catalogue = with_correction(
+        with_yielding(with_bearing("link", BREAKS), "hysteresis"), "muscle", CORRECTED
+    )
 
     def bind(self, plant: Any, recording: Recording, sheet: Rig) -> BoundElbow:
         """Return an orthosis with the inputs of a recording; ValueError with on/off valves."""

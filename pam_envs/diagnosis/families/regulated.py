@@ -80,6 +80,11 @@ class RegulatedFamily(CompiledFamily):
     law: ClassVar[str] = ""
     """Component with the correction of the static law."""
 
+    @property
+    def abreast(self) -> float:
+        """Number of muscles side by side with whose force a law is checked."""
+        return 1.0
+
     def recorded_states(self, measured: Array) -> Array:
         """Return groups of pressures [Pa] and strains of readings (channels, T), (2, k)."""
         return np.zeros((2, 0))
@@ -114,6 +119,7 @@ class RegulatedFamily(CompiledFamily):
         stiff, gain, usual = self.law_slopes(columns, pressure, strain)
         sizes = columns[:, [self.plant.names.index(f"{self.law}.{name}") for name in TERM_NAMES]]
         by_pressure, by_strain = self._correction_slopes
+        sizes = self.abreast * sizes
         return not_monotone(stiff - sizes @ by_strain, gain + sizes @ by_pressure, usual)
 
     @cached_property

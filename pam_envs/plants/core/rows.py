@@ -13,7 +13,7 @@ from typing import Any
 
 from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.mechanics.guide import GUIDE
-from pam_envs.muscle.effects import LengthYieldEffects
+from pam_envs.muscle.effects import VISCOSITY, LengthYieldEffects
 from pam_envs.muscle.law_correction import FIELDS
 from pam_envs.parameters import declarations, row_blocks
 from pam_envs.plants.core.muscle_path import PATH_NAMES, WARM
@@ -46,12 +46,14 @@ def path_effects(
     law: str | None = None,
     yields: str | None = None,
     pair: str | None = None,
+    viscous: str | None = None,
 ) -> dict[str, tuple[str, ...]]:
     """Return the names of the effects of muscle paths, a bearing, sensors and a law, by block.
 
     ``muscles`` are the components that have a temperature each (see ``core.muscle_path``), ``law``
     is that with the correction of the static law, ``yields`` that with yielding friction, ``pair``
-    that of muscles in pairs, whose friction may differ and have a tail.
+    that of muscles in pairs, whose friction may differ and have a tail, ``viscous`` that with the
+    viscosity.
     """
     rubs = {"bearing": dotted(**{bearing: " ".join(GUIDE._fields)})} if bearing else {}
     warm = {"warm": dotted(**dict.fromkeys(muscles, " ".join(WARM._fields)))}
@@ -59,7 +61,8 @@ def path_effects(
     maps = {"law": dotted(**{law: " ".join(FIELDS)})} if law else {}
     soft = {"soft": dotted(**{yields: " ".join(YIELD_FIELDS)})} if yields else {}
     uneven = {"uneven": dotted(**{pair: "friction_imbalance yield_tail"})} if pair else {}
-    return {"path": PATH_NAMES} | warm | rubs | shown | maps | soft | uneven
+    slow = {"viscous": dotted(**{viscous: " ".join(VISCOSITY._fields)})} if viscous else {}
+    return {"path": PATH_NAMES} | warm | rubs | shown | maps | soft | uneven | slow
 
 
 def layout(

@@ -1,15 +1,17 @@
 """Effects of the elbow orthosis: kernels that replace the placeholders.
 
 With proportional valves both bundles have all effects of their path; with on/off valves creep,
-first cycles and temperature. Friction of the bundles may yield smoothly. The bearing sticks and
-slips, and the sensors have their effects.
+first cycles and temperature. Friction of the bundles may yield smoothly, viscous forces resist
+their contraction, and a correction of the law depends on effective pressure and strain. The bearing
+sticks and slips, and the sensors have their effects.
 """
 
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.kernels.yielding import deflected_with_tail
-from pam_envs.muscle.effects import yield_spring
+from pam_envs.muscle.effects import taut_damping, yield_spring
+from pam_envs.muscle.law_correction import correction_force, correction_slope
 from pam_envs.plants.core.muscle_path import (
     DELAYED,
     PATH_STATE,
@@ -229,6 +231,33 @@ def stick_of(rows: Any, j: int, side: int) -> float:
     return rows[EFFECTS_AT + K.STATE.stick + side][j]  # type: ignore[no-any-return]
 
 
+@kernel
+def corrected_force(
+    fixed: Any, j: int, side: int, contraction: float, pressure: float
+) -> tuple[float, float]:
+    """Return the force [N] of the law's correction of a bundle, and its growth [N/m].
+
+    At a contraction [m] and an effective pressure [Pa]; the growth is that with the contraction.
+    """
+    row = side * len(K.BUNDLE)
+    muscles, length = fixed[row + K.BUNDLE.muscles][j], fixed[row + K.BUNDLE.nominal_length][j]
+    whole, strain = muscles * fixed[row + K.BUNDLE.gain][j], contraction / length
+    force = correction_force(fixed, j, K.EFFECT.law, pressure, strain)
+    slope = correction_slope(fixed, j, K.EFFECT.law, pressure, strain)
+    return whole * force, -whole * slope / length
+
+
+@kernel
+def drag_of(fixed: Any, j: int, side: int, speed: float, pressure: float, force: float) -> float:
+    """Return the damping [N s/m] of a bundle by viscosity, at a speed of its contraction [m/s].
+
+    ``pressure`` [Pa] is the effective one, ``force`` [N] that without viscosity.
+    """
+    muscles = fixed[side * len(K.BUNDLE) + K.BUNDLE.muscles][j]
+    one = taut_damping(fixed, j, K.EFFECT.viscous, speed, pressure, force / muscles)
+    return muscles * one  # type: ignore[no-any-return]
+
+
 def bundle_kernels(valves: str, first: int) -> dict[str, Any]:
     """Return the kernels of the effects, whose state begins at row ``first``."""
     regulated = valves == "proportional"
@@ -245,4 +274,6 @@ def bundle_kernels(valves: str, first: int) -> dict[str, Any]:
         "move_yield": move_yield,
         "rub_of": rub_of,
         "stick_of": stick_of,
+        "more_force": corrected_force,
+        "drag_of": drag_of,
     }

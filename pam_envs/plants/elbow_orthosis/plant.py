@@ -10,7 +10,7 @@ of the four corners at which each bundle is empty or full. The stiffness is minu
 ``K_q``, which is negative.
 
 Effects (off unless set, ``ElbowOrthosis.effects``): of the regulators (on/off valves have none), of
-both bundles, of the bearing and of the sensors.
+both bundles, of each of their muscles, of the bearing and of the sensors.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from pam_envs.hysteresis.protocol import Usage
 from pam_envs.hysteresis.slip import SlipModel
 from pam_envs.mechanics.forearm import OrthosisLink, Wearer
 from pam_envs.mechanics.pulley import Pulley
-from pam_envs.muscle.quadratic_bundle import QuadraticBundle
+from pam_envs.muscle.quadratic_bundle import BundleMuscle, QuadraticBundle
 from pam_envs.plants.core.passivity import ImposedMuscles
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.elbow_orthosis import rows as K
@@ -59,8 +59,9 @@ class ElbowOrthosis(Plant, rows=K):
     valves : {"proportional", "on_off"}
         A regulator at each bundle that takes setpoints, or the paper's pair of a fill and an
         exhaust valve, which takes pulses.
-    bundle_a, bundle_b, regulator, valve, hysteresis, pulley, link, wearer
-        The components; of regulator and valve the one that is not in use has no effect.
+    bundle_a, bundle_b, muscle, regulator, valve, hysteresis, pulley, link, wearer
+        The components; ``muscle`` holds effects that the muscles of both bundles have. Of regulator
+        and valve the one that is not in use has no effect.
     angle, pressure
         The sensors; both pressure gauges are alike.
     """
@@ -71,6 +72,7 @@ class ElbowOrthosis(Plant, rows=K):
     valves: Valves = "proportional"
     bundle_a: QuadraticBundle = field(default_factory=QuadraticBundle)
     bundle_b: QuadraticBundle = field(default_factory=lambda: QuadraticBundle(muscles=7.0))
+    muscle: BundleMuscle = field(default_factory=BundleMuscle)
     regulator: BundleRegulator = field(default_factory=BundleRegulator)
     valve: OnOffValve = field(default_factory=OnOffValve)
     hysteresis: ElbowHysteresis = field(default_factory=lambda: elbow_hysteresis("maxwell_slip"))
@@ -136,6 +138,9 @@ class ElbowOrthosis(Plant, rows=K):
             )
         inertia = self.link.inertia + self.wearer.inertia
         damping = self.link.damping + self.wearer.damping
+        muscles = self.bundle_a.muscles + self.bundle_b.muscles
+        viscous = muscles * self.muscle.damping_at_rest(self.full_pressure)
+        damping += viscous * self.pulley.radius**2
         ends = np.array(self.angle_range)
         full = float(np.max(self.stiffness(ends, self.full_pressure, self.full_pressure)))
         k = full + self._air_stiffness() + self.wearer.stiffness + self.pulley.stop_stiffness
@@ -221,9 +226,17 @@ class ElbowOrthosis(Plant, rows=K):
     def forces(
         self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike
     ) -> tuple[Array, Array]:
-        """Return both forces [N], 0 where a bundle is slack."""
+        """Return both forces [N] with the correction of the law, 0 where a bundle is slack."""
         c_a, c_b = self.pulley.contractions(angle)
-        return self.bundle_a.force(pressure_a, c_a), self.bundle_b.force(pressure_b, c_b)
+        force_a = self._force(self.bundle_a, pressure_a, c_a)
+        return force_a, self._force(self.bundle_b, pressure_b, c_b)
+
+    def _force(self, bundle: QuadraticBundle, pressure: ArrayLike, contraction: Array) -> Array:
+        law = bundle.law(pressure, contraction)
+        if self.muscle.corrects:
+            more = self.muscle.correction(pressure, contraction / bundle.nominal_length)
+            law = law + bundle.gain * bundle.muscles * more
+        return np.maximum(0.0, law)
 
     def torque(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
         """Return the torque ``Q`` [N m] at an angle [rad] and pressures [Pa], Eq. (23)."""

@@ -49,7 +49,9 @@ globals().update(
             *("bundle_a", "bundle_b"),
             bearing="link",
             sensors=("angle", "pressure"),
+            law="muscle",
             yields="hysteresis",
+            viscous="muscle",
         )
         | {"tail": ("hysteresis.yield_tail",)},
         each("effective crept deflection yielded stick", 2)

@@ -87,6 +87,20 @@ def stick_of(rows: Any, j: int, side: int) -> float:
 
 
 @kernel
+def more_force(
+    fixed: Any, j: int, side: int, contraction: float, pressure: float
+) -> tuple[float, float]:
+    """Return the force [N] of the law's correction of a bundle, and its growth [N/m]: none."""
+    return 0.0, 0.0
+
+
+@kernel
+def drag_of(fixed: Any, j: int, side: int, speed: float, pressure: float, force: float) -> float:
+    """Return the damping [N s/m] of a bundle by viscosity: a plain plant has none."""
+    return 0.0
+
+
+@kernel
 def lag_of(rows: Any, j: int, side: int) -> float:
     """Return the hysteresis lag [m] of the travel that a bundle has."""
     return rows[K.LAG_A + side * (OPERATORS - 1)][j]  # type: ignore[no-any-return]
@@ -97,13 +111,15 @@ def pulled_by_length(
     fixed: Any, j: int, side: int, angle: float, lag: float, rub: float, pressure: float
 ) -> tuple[float, float, float]:
     """Return :func:`pulled` with friction of constant stiffness, whose limit has the pressure."""
-    shape, slope = shape_of(fixed, j, side, contraction_at(fixed, j, side, angle))
+    contraction = contraction_at(fixed, j, side, angle)
+    shape, slope = shape_of(fixed, j, side, contraction)
     passive, pressed = factors_of(fixed, j, side)
     factor = passive + pressed * pressure
     stiff = passive + pressed * REFERENCE_PRESSURE
-    force = factor * shape - stiff * friction_of(fixed, j, side, lag) - rub
+    more, steeper = more_force(fixed, j, side, contraction, pressure)
+    force = factor * shape - stiff * friction_of(fixed, j, side, lag) - rub + more
     tight = 1.0 if force > 0.0 else 0.0
-    return tight * force, tight * factor * slope, tight * pressed * shape
+    return tight * force, tight * (factor * slope + steeper), tight * pressed * shape
 
 
 @kernel
@@ -146,13 +162,15 @@ def pulled_at_pressure(
     ``rub`` is the yielding friction [N]. The growth with contraction is the law's, at a held
     pressure; all are 0 for a slack bundle.
     """
-    shape, slope = shape_of(fixed, j, side, contraction_at(fixed, j, side, angle))
+    contraction = contraction_at(fixed, j, side, angle)
+    shape, slope = shape_of(fixed, j, side, contraction)
     passive, pressed = factors_of(fixed, j, side)
     factor = passive + pressed * pressure
     felt = shape - friction_of(fixed, j, side, lag)
-    force = factor * felt - rub
+    more, steeper = more_force(fixed, j, side, contraction, pressure)
+    force = factor * felt - rub + more
     tight = 1.0 if force > 0.0 else 0.0
-    return tight * force, tight * factor * slope, tight * pressed * felt
+    return tight * force, tight * (factor * slope + steeper), tight * pressed * felt
 
 
 @kernel
@@ -185,11 +203,14 @@ def drive_of(rows: Any, fixed: Any, j: int) -> float:
 
 
 @kernel
-def middle_torque(rows: Any, fixed: Any, j: int, work: Any) -> tuple[float, float, float]:
-    """Return the torque [N m] at the middle before and after, and minus its slope [N m/rad]."""
+def middle_torque(rows: Any, fixed: Any, j: int, work: Any) -> tuple[float, float, float, float]:
+    """Return the torque [N m] at the middle before and after, without viscosity.
+
+    Then minus its slope [N m/rad], and the damping by viscosity [N m s/rad].
+    """
     angle, radius = work[MIDDLE][j], fixed[K.PULLEY_RADIUS][j]
     old, slope = passive_torque(fixed, j, angle)
-    new = old
+    new, viscous = old, 0.0
     for side in range(2):
         sign, lag = 2.0 * side - 1.0, lag_of(rows, j, side)
         before, after = work[WAS_A + side][j], work[NOW_A + side][j]
@@ -199,7 +220,10 @@ def middle_torque(rows: Any, fixed: Any, j: int, work: Any) -> tuple[float, floa
         old, new = old + sign * radius * was, new + sign * radius * now
         growth = 0.5 * (soft + hard) - swell * work[GIVES_A + side][j] - stick_of(rows, j, side)
         slope = slope - radius * radius * growth
-    return old, new, slope
+        speed = sign * radius * rows[K.VELOCITY][j]
+        drag = drag_of(fixed, j, side, speed, 0.5 * (before + after), 0.5 * (was + now))
+        viscous = viscous + radius * radius * drag
+    return old, new, slope, viscous
 
 
 @kernel
@@ -207,14 +231,15 @@ def swing(rows: Any, fixed: Any, i: int, substeps: int, h: float, work: Any) -> 
     """Move the forearms of a tile through sub-step ``i``."""
     angle, velocity, share = rows[K.ANGLE], rows[K.VELOCITY], 1.0 / substeps
     for j in range(LANES):
-        old, new, slope = middle_torque(rows, fixed, j, work)
+        old, new, slope, viscous = middle_torque(rows, fixed, j, work)
         climb = (rows[K.DRIVE][j] - work[DRIVE_WAS][j]) * share
         driven = work[DRIVE_WAS][j] + i * climb + rows[K.DISTURBANCE][j]
         ahead, hold = 0.5 * h * velocity[j], fixed[K.WEARER_STIFFNESS][j]
         stiffness = max(SOFTEST, slope + hold)
         total = old + driven - hold * work[MIDDLE][j] + stiffness * ahead
         per_inertia = 1.0 / (fixed[K.LINK_INERTIA][j] + fixed[K.WEARER_INERTIA][j])
-        drag = (fixed[K.LINK_DAMPING][j] + fixed[K.WEARER_DAMPING][j]) * per_inertia
+        drag = fixed[K.LINK_DAMPING][j] + fixed[K.WEARER_DAMPING][j] + viscous
+        drag = drag * per_inertia
         du, velocity[j] = turn(
             rows, fixed, j, velocity[j], total * per_inertia, (new - old + climb) * per_inertia / h,
             stiffness * per_inertia, drag, per_inertia, h,
@@ -262,6 +287,9 @@ def report(rows: Any, fixed: Any, j: int) -> None:
         effective = rows[EFFECTIVE + side][j]
         lag, rub = lag_of(rows, j, side), rub_of(rows, fixed, j, side, effective)
         force, growth, _ = pulled(fixed, j, side, angle, lag, rub, effective)
+        speed = (2.0 * side - 1.0) * radius * velocity
+        drag = drag_of(fixed, j, side, speed, effective, force)
+        force = max(0.0, force - drag * speed) if drag > 0.0 else force
         rows[K.CONTRACTION_A + side][j] = contraction_at(fixed, j, side, angle)
         rows[K.FORCE_A + side][j] = force
         torque = torque + (2.0 * side - 1.0) * radius * force

@@ -2,8 +2,8 @@
 
 The muscle has the effects of its path (those of the air only behind the regulator's lag); the
 hysteresis turns the effective pressure into stiffness, and a correction of the law depends on
-effective pressure and length. The bearing of the brace without a leg
-sticks and slips, and all sensors have their effects.
+effective pressure and length. A viscous force resists its contraction. The bearing of the brace
+without a leg sticks and slips, and all sensors have their effects.
 """
 
 from typing import Any
@@ -12,6 +12,7 @@ from pam_envs.constants import DENSITY_PER_PRESSURE
 from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, scratch
 from pam_envs.mechanics.knee_lever import muscle_length
+from pam_envs.muscle.effects import taut_damping
 from pam_envs.muscle.gas_spring import gas_volume, stretch_of
 from pam_envs.muscle.law_correction import correction_force, correction_slope
 from pam_envs.plants.core.muscle_path import (
@@ -23,6 +24,7 @@ from pam_envs.plants.core.muscle_path import (
 )
 from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.plants.knee_orthosis import rows as K
+from pam_envs.plants.knee_orthosis.motion import tension_of
 from pam_envs.pneumatics.enclosed_air import AHEAD, REACHED, air_stiffness, enclose, flows_on
 from pam_envs.pneumatics.regulator import AIR, AIR_STATE
 
@@ -144,20 +146,50 @@ def full_length(fixed: Any, j: int) -> float:
 
 
 @kernel
+def drive_of(rows: Any, j: int) -> float:
+    """Return the effective pressure [Pa] of lane ``j``, with that beyond the regulator's range."""
+    return rows[EFFECTS_AT + K.STATE.effective][j] + rows[EFFECTS_AT + K.STATE.beyond][j]  # type: ignore[no-any-return]
+
+
+@kernel
 def corrected_tension(rows: Any, fixed: Any, j: int, length: float) -> float:
     """Return the tension [N] of the law's correction at a length [m]."""
-    drive = rows[EFFECTS_AT + K.STATE.effective][j] + rows[EFFECTS_AT + K.STATE.beyond][j]
     strain = 1.0 - length / full_length(fixed, j)
-    return correction_force(fixed, j, K.EFFECT.law, drive, strain)  # type: ignore[no-any-return]
+    return correction_force(fixed, j, K.EFFECT.law, drive_of(rows, j), strain)  # type: ignore[no-any-return]
 
 
 @kernel
 def corrected_stiffness(rows: Any, fixed: Any, j: int, length: float) -> float:
     """Return the derivative of :func:`corrected_tension` by length [N/m]."""
-    drive = rows[EFFECTS_AT + K.STATE.effective][j] + rows[EFFECTS_AT + K.STATE.beyond][j]
     full = full_length(fixed, j)
     strain = 1.0 - length / full
-    return correction_slope(fixed, j, K.EFFECT.law, drive, strain) / full  # type: ignore[no-any-return]
+    return correction_slope(fixed, j, K.EFFECT.law, drive_of(rows, j), strain) / full  # type: ignore[no-any-return]
+
+
+@kernel
+def viscous_drag(
+    rows: Any, fixed: Any, j: int, angle: float, rate: float, stiffness: float
+) -> float:
+    """Return the damping [N m s/rad] by viscosity at an angle, its rate and a stiffness [N/m]."""
+    sine, cosine = sine_and_cosine(0.5 * angle)
+    arm = fixed[K.LEVER_ARM][j]
+    lever = arm * cosine
+    length = muscle_length(sine, arm, fixed[K.LEVER_FITTINGS][j])
+    tension = tension_of(rows, fixed, j, length, stiffness)
+    drive, speed = drive_of(rows, j), -lever * rate
+    damping = taut_damping(fixed, j, K.EFFECT.viscous, speed, drive, tension)
+    return lever * lever * damping  # type: ignore[no-any-return]
+
+
+@kernel
+def report_drag(rows: Any, fixed: Any, j: int) -> None:
+    """Add the viscous force of the muscle of lane ``j`` to its tension and torque."""
+    _, cosine = sine_and_cosine(0.5 * rows[K.ANGLE][j])
+    lever, tension = fixed[K.LEVER_ARM][j] * cosine, rows[K.TENSION][j]
+    drive, speed = drive_of(rows, j), -lever * rows[K.VELOCITY][j]
+    damping = taut_damping(fixed, j, K.EFFECT.viscous, speed, drive, tension)
+    rows[K.TENSION][j] = max(0.0, tension - damping * speed)
+    rows[K.TORQUE][j] = rows[K.TORQUE][j] - lever * damping * speed
 
 
 @kernel
@@ -235,4 +267,6 @@ def muscle_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
         "leaked_air": leaked_air,
         "more_tension": corrected_tension,
         "more_stiffness": corrected_stiffness,
+        "brace_drag": viscous_drag,
+        "report_drag": report_drag,
     }

@@ -392,6 +392,25 @@ def more_stiffness(rows: Any, fixed: Any, j: int, length: float) -> float:
 
 
 @kernel
+def brace_drag(rows: Any, fixed: Any, j: int, angle: float, rate: float, stiffness: float) -> float:
+    """Return the damping [N m s/rad] by the muscle's viscosity: a plain plant has none."""
+    return 0.0
+
+
+@kernel
+def report_drag(rows: Any, fixed: Any, j: int) -> None:
+    """Add the muscle's viscous force to tension and torque of a lane: a plain plant has none."""
+
+
+@kernel
+def tension_of(rows: Any, fixed: Any, j: int, length: float, stiffness: float) -> float:
+    """Return the tension [N] at a length [m] and a stiffness [N/m], without viscosity."""
+    stretch = stretch_of(length, fixed[K.MUSCLE_SHORTEST_LENGTH][j])
+    pull = spring_tension(stiffness, stretch) + more_tension(rows, fixed, j, length)
+    return max(0.0, pull + rows[K.RUB][j] * rows[K.LAG][j])
+
+
+@kernel
 def torque_and_slope(
     rows: Any, fixed: Any, j: int, angle: float, stiffness: float
 ) -> tuple[float, float]:
@@ -400,12 +419,10 @@ def torque_and_slope(
     arm, spring = fixed[K.LEVER_ARM][j], fixed[K.LEVER_STIFFNESS][j]
     length = muscle_length(sine, arm, fixed[K.LEVER_FITTINGS][j])
     stretch = stretch_of(length, fixed[K.MUSCLE_SHORTEST_LENGTH][j])
-    rub = rows[K.RUB][j]
-    pull = spring_tension(stiffness, stretch) + more_tension(rows, fixed, j, length)
-    tension = max(0.0, pull + rub * rows[K.LAG][j])
+    tension = tension_of(rows, fixed, j, length, stiffness)
     torque = assistive_torque(tension, cosine, angle, arm, spring, fixed[K.LEVER_RELAXED_ANGLE][j])
     pulls = max(0.0, stiffness) if stretch > 0.0 else 0.0
-    pulls = pulls + more_stiffness(rows, fixed, j, length) + rub * rows[K.STICK][j]
+    pulls = pulls + more_stiffness(rows, fixed, j, length) + rows[K.RUB][j] * rows[K.STICK][j]
     lever = arm * cosine
     return torque, spring + pulls * lever * lever - 0.5 * tension * arm * sine
 
@@ -507,7 +524,8 @@ def swing_free(
     for j in range(LANES):
         ahead = 0.5 * h * velocity[j]
         per_inertia = 1.0 / fixed[K.LEVER_INERTIA][j]
-        drag = fixed[K.LEVER_DAMPING][j] * per_inertia
+        rubs = brace_drag(rows, fixed, j, angle[j] + ahead, velocity[j], stiffness[j])
+        drag = (fixed[K.LEVER_DAMPING][j] + rubs) * per_inertia
         old, slope_old = torque_and_slope(rows, fixed, j, angle[j] + ahead, was[j])
         new, slope_new = torque_and_slope(rows, fixed, j, angle[j] + ahead, stiffness[j])
         slope = max(1.0, 0.5 * (slope_old + slope_new) + enclosed_stiffness(rows, j))
@@ -566,15 +584,16 @@ def follow_leg(
             0.5 * h * rate[j],
             1.0 / (fixed[K.LEG_INERTIA][j] + fixed[K.LEVER_INERTIA][j]),
         )
-        drag = (held_rate[j] + fixed[K.LEVER_DAMPING][j]) * per_inertia
         middle = mount[j] + off[j] + ahead
+        rubs = brace_drag(rows, fixed, j, middle + knee, rate[j] + turn, stiffness[j])
+        drag = (held_rate[j] + fixed[K.LEVER_DAMPING][j] + rubs) * per_inertia
         old, slope_old = torque_and_slope(rows, fixed, j, middle + work[KNEE_WAS][j], was[j])
         new, slope_new = torque_and_slope(rows, fixed, j, middle + knee, stiffness[j])
         old = old + along_path(fixed, j, work[RATE_WAS][j], work[FORCE_WAS][j])
         old = old - habituated(fixed, j, work[KNEE_WAS][j])
         new = new + along_path(fixed, j, turn, bend) - habituated(fixed, j, knee)
         own = rows[K.REFLEX][j] - work[EXPECTS][j]
-        old, new = old + own, new + own
+        old, new = old + own + rubs * work[RATE_WAS][j], new + own + rubs * turn
         slope = 0.5 * (slope_old + slope_new) + enclosed_stiffness(rows, j)
         du, rate[j] = damped_motion(
             rate[j],
@@ -605,11 +624,8 @@ def habituated(fixed: Any, j: int, knee: float) -> float:
 @kernel
 def report_muscle(rows: Any, fixed: Any, j: int, length: float) -> None:
     """Write length, tension and air of one lane."""
-    stretch = stretch_of(length, fixed[K.MUSCLE_SHORTEST_LENGTH][j])
     rows[K.LENGTH][j] = length
-    rub = rows[K.RUB][j] * rows[K.LAG][j]
-    pull = spring_tension(rows[K.STIFFNESS][j], stretch) + more_tension(rows, fixed, j, length)
-    rows[K.TENSION][j] = max(0.0, pull + rub)
+    rows[K.TENSION][j] = tension_of(rows, fixed, j, length, rows[K.STIFFNESS][j])
     space = gas_volume(
         length,
         fixed[K.MUSCLE_SHORTEST_LENGTH][j],
@@ -627,6 +643,7 @@ def report_alone(rows: Any, fixed: Any, j: int, period: float) -> None:
         rows, fixed, j, muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
     )
     rows[K.TORQUE][j], _ = torque_and_slope(rows, fixed, j, rows[K.ANGLE][j], rows[K.STIFFNESS][j])
+    report_drag(rows, fixed, j)
 
 
 @kernel
@@ -754,6 +771,9 @@ def rest_leg(
         off = 0.5 * (low + high)
         feel_at(rows, fixed, counts, table, hysteresis, elements, j, angle + off)
         torque, _ = torque_and_slope(rows, fixed, j, angle + off, rows[K.STIFFNESS][j])
+        rate = rows[K.KNEE_RATE][j]
+        rubs = brace_drag(rows, fixed, j, angle + off, rate, rows[K.STIFFNESS][j])
+        torque = torque + rubs * rate
         if torque + load + rows[K.HOLD][j] * off < 0.0:
             low = off
         else:

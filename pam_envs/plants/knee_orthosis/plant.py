@@ -11,7 +11,8 @@ stairs on a path that he holds with a stiffness of his own, and the knee bears t
 ground force, weight and acceleration, of which the paper's Eq. (1) sees the vertical force alone.
 
 Effects (off unless set, ``KneeOrthosis.effects``): of the regulator (the measured dynamics replace
-them), of the muscle before its hysteresis, of the bearing of the brace alone, and of all sensors.
+them), of the muscle before its hysteresis, its viscosity and a correction of its law, of the
+bearing of the brace alone, and of all sensors.
 """
 
 from __future__ import annotations
@@ -156,6 +157,8 @@ class KneeOrthosis(Plant, rows=K):
         """Refuse too fast a motion, and a strap with which the wire opens past its toggle."""
         lever, leg, hold = self.lever, self.leg, 0.0
         inertia, damping = lever.inertia, lever.damping
+        viscous = self.muscle.damping_at_rest(self.regulator.max_pressure)
+        damping += viscous * lever.arm**2
         if self.mounting == "leg":
             inertia += leg.inertia
             damping += leg.hold_damping + leg.stance_damping + leg.damping

@@ -40,7 +40,7 @@ globals().update(
             activation="largest_torque floor rise_time fall_time",
             **dict.fromkeys(SENSORS, "noise resolution bias"),
         ),
-        path_effects("muscle", bearing="lever", sensors=SENSORS, law="muscle"),
+        path_effects("muscle", bearing="lever", sensors=SENSORS, law="muscle", viscous="muscle"),
         {
             "effective": 1,
             "beyond": 1,
