@@ -16,12 +16,14 @@ from numpy.polynomial.chebyshev import chebval2d
 from numpy.typing import ArrayLike
 
 from pam_envs.arrays import Array
+from pam_envs.kernels.arithmetic import count_on
 from pam_envs.kernels.build import kernel
 from pam_envs.muscle.effects import (
     MAP_TERMS,
     StaticMapEffects,
     map_coordinate,
     map_force,
+    map_on,
     map_slopes,
 )
 from pam_envs.parameters import assumed, declarations, effect, named_rows
@@ -72,6 +74,17 @@ FIELDS = tuple(declarations(LawCorrection))
 """Parameters in the order of their rows."""
 ROWS = named_rows(*FIELDS)
 """Rows of the correction, from its first."""
+LOWEST = ROWS.map_00
+"""Row of the first of :data:`LOWER_TERMS`; the others follow."""
+
+
+@kernel
+def correction_on(sizes: Any, first: int) -> int:
+    """Return the number of lanes and terms of a tile with a correction, in rows from ``first``."""
+    on = map_on(sizes, first)
+    for k in range(len(LOWER_TERMS)):
+        on = on + count_on(sizes[first + LOWEST + k], 0.0)
+    return on
 
 
 @kernel

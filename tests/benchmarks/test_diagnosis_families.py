@@ -31,6 +31,8 @@ def test_every_place_has_every_effect_ten_times_and_fifty_clean_rigs():
     assert Counter(c.world for c in drawn if c.kind == "clean") == dict.fromkeys(PLACES, 50)
     assert all(1.0 <= size <= 5.0 for case in drawn for size in case.sizes)
     assert "unequal_muscles" not in effects_of("knee_orthosis")
+    assert "viscous_loss" in effects_of("knee_orthosis")
+    assert "viscous_loss" not in effects_of("antagonistic_joint")  # of its base
     seeds = {place: {c.seed for c in drawn if c.world == place} for place in PLACES}
     assert sum(len(own) for own in seeds.values()) == len(set().union(*seeds.values()))
     assert not {case.seed for case in cases(1)} & set().union(*seeds.values())

@@ -60,9 +60,18 @@ PLACES = tuple(place_of(family, world) for family in FAMILIES for world in WORLD
 
 
 def effects_of(family: str) -> tuple[str, ...]:
-    """Return the hidden effects that the catalogue of a family has a cause of."""
+    """Return the hidden effects that the catalogue of a family has a cause of.
+
+    A cause whose parameters all belong to the base, as the viscosity of a joint, does not count.
+    """
     kind = kind_named(family)
-    known = {cause.name for cause in kind.causes(kind.catalogue)}
+    plant = kind.start(Rig(plant=family))
+    known = {
+        cause.name
+        for cause in kind.causes(kind.catalogue)
+        for form in cause.forms
+        if any(t.amount and plant.declaration(t.name).neutral is not None for t in form.terms)
+    }
     return tuple(name for name in HIDDEN if name in known)
 
 

@@ -8,10 +8,10 @@ sticks and slips, and the sensors have their effects.
 
 from typing import Any
 
-from pam_envs.kernels.build import LANES, kernel
+from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.yielding import deflected_with_tail
 from pam_envs.muscle.effects import taut_damping, yield_spring
-from pam_envs.muscle.law_correction import correction_force, correction_slope
+from pam_envs.muscle.law_correction import correction_force, correction_on, correction_slope
 from pam_envs.plants.core.muscle_path import (
     DELAYED,
     PATH_STATE,
@@ -26,6 +26,7 @@ from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.bundles import (
     AIR,
     GIVES_A,
+    MIDDLE,
     NOW_A,
     WAS_A,
     contraction_at,
@@ -232,19 +233,78 @@ def stick_of(rows: Any, j: int, side: int) -> float:
 
 
 @kernel
-def corrected_force(
-    fixed: Any, j: int, side: int, contraction: float, pressure: float
-) -> tuple[float, float]:
-    """Return the force [N] of the law's correction of a bundle, and its growth [N/m].
+def corrected_force(fixed: Any, j: int, side: int, contraction: float, pressure: float) -> float:
+    """Return the force [N] of the law's correction of a bundle.
 
-    At a contraction [m] and an effective pressure [Pa]; the growth is that with the contraction.
+    At a contraction [m] and an effective pressure [Pa].
     """
     row = side * len(K.BUNDLE)
-    muscles, length = fixed[row + K.BUNDLE.muscles][j], fixed[row + K.BUNDLE.nominal_length][j]
-    whole, strain = muscles * fixed[row + K.BUNDLE.gain][j], contraction / length
+    strain = contraction / fixed[row + K.BUNDLE.nominal_length][j]
     force = correction_force(fixed, j, K.EFFECT.law, pressure, strain)
-    slope = correction_slope(fixed, j, K.EFFECT.law, pressure, strain)
-    return whole * force, -whole * slope / length
+    return fixed[row + K.BUNDLE.muscles][j] * fixed[row + K.BUNDLE.gain][j] * force  # type: ignore[no-any-return]
+
+
+@kernel
+def corrected_growth(fixed: Any, j: int, side: int, contraction: float, pressure: float) -> float:
+    """Return the derivative [N/m] of :func:`corrected_force` by contraction."""
+    row = side * len(K.BUNDLE)
+    per_length = 1.0 / fixed[row + K.BUNDLE.nominal_length][j]
+    slope = correction_slope(fixed, j, K.EFFECT.law, pressure, contraction * per_length)
+    muscles = fixed[row + K.BUNDLE.muscles][j] * fixed[row + K.BUNDLE.gain][j]
+    return -muscles * slope * per_length  # type: ignore[no-any-return]
+
+
+@routine
+def correct_motion(rows: Any, fixed: Any, work: Any) -> None:
+    """Write the correction of the law in a sub-step of a tile, where it is on."""
+    if correction_on(fixed, K.EFFECT.law) == 0:
+        return
+    for side in range(2):
+        was, now = rows[EFFECTS_AT + K.STATE.more + side], rows[EFFECTS_AT + K.STATE.next + side]
+        growth, before, after = (
+            rows[EFFECTS_AT + K.STATE.steeper + side],
+            work[WAS_A + side],
+            work[NOW_A + side],
+        )
+        for j in range(LANES):
+            at = contraction_at(fixed, j, side, work[MIDDLE][j])
+            was[j] = corrected_force(fixed, j, side, at, before[j])
+            now[j] = corrected_force(fixed, j, side, at, after[j])
+            growth[j] = corrected_growth(fixed, j, side, at, 0.5 * (before[j] + after[j]))
+
+
+@routine
+def correct_at(rows: Any, fixed: Any, j: int, angle: float) -> None:
+    """Write the correction of the law at an angle [rad] of one lane."""
+    for side in range(2):
+        pressure = rows[EFFECTS_AT + K.STATE.effective + side][j]
+        at = contraction_at(fixed, j, side, angle)
+        rows[EFFECTS_AT + K.STATE.more + side][j] = corrected_force(fixed, j, side, at, pressure)
+        rows[EFFECTS_AT + K.STATE.steeper + side][j] = corrected_growth(
+            fixed, j, side, at, pressure
+        )
+        rows[EFFECTS_AT + K.STATE.next + side][j] = 0.0
+
+
+@kernel
+def correct_report(rows: Any, fixed: Any) -> None:
+    """Write the correction of the law at the angles of a tile, where it is on."""
+    if correction_on(fixed, K.EFFECT.law) > 0:
+        for j in range(LANES):
+            correct_at(rows, fixed, j, rows[K.ANGLE][j])
+
+
+@kernel
+def more_of(rows: Any, j: int, side: int) -> tuple[float, float, float]:
+    """Return the forces [N] of the law's correction of a bundle before and after a sub-step.
+
+    Then their derivative by contraction [N/m].
+    """
+    return (
+        rows[EFFECTS_AT + K.STATE.more + side][j],
+        rows[EFFECTS_AT + K.STATE.next + side][j],
+        rows[EFFECTS_AT + K.STATE.steeper + side][j],
+    )
 
 
 @kernel
@@ -274,6 +334,9 @@ def bundle_kernels(valves: str, first: int) -> dict[str, Any]:
         "move_yield": move_yield,
         "rub_of": rub_of,
         "stick_of": stick_of,
-        "more_force": corrected_force,
+        "correct_motion": correct_motion,
+        "correct_report": correct_report,
+        "correct_at": correct_at,
+        "more_of": more_of,
         "drag_of": drag_of,
     }

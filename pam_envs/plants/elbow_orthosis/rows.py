@@ -54,7 +54,7 @@ globals().update(
             viscous="muscle",
         )
         | {"tail": ("hysteresis.yield_tail",)},
-        each("effective crept deflection yielded stick", 2)
+        each("effective crept deflection yielded stick more next steeper", 2)
         | {"paths": 2 * PATH_STATE.end, "stuck": 1, "sensors": sensor_rows(3)},
         {"model": NUMBERS, "largest_lag": 1},
         operators=2,

@@ -87,11 +87,27 @@ def stick_of(rows: Any, j: int, side: int) -> float:
 
 
 @kernel
-def more_force(
-    fixed: Any, j: int, side: int, contraction: float, pressure: float
-) -> tuple[float, float]:
-    """Return the force [N] of the law's correction of a bundle, and its growth [N/m]: none."""
-    return 0.0, 0.0
+def correct_motion(rows: Any, fixed: Any, work: Any) -> None:
+    """Write the correction of the law in a sub-step of a tile: a plain plant has none."""
+
+
+@kernel
+def correct_report(rows: Any, fixed: Any) -> None:
+    """Write the correction of the law at the angles of a tile: a plain plant has none."""
+
+
+@kernel
+def correct_at(rows: Any, fixed: Any, j: int, angle: float) -> None:
+    """Write the correction of the law at an angle [rad] of one lane: a plain plant has none."""
+
+
+@kernel
+def more_of(rows: Any, j: int, side: int) -> tuple[float, float, float]:
+    """Return the forces [N] of the law's correction of a bundle before and after a sub-step.
+
+    Then their derivative by contraction [N/m].
+    """
+    return 0.0, 0.0, 0.0
 
 
 @kernel
@@ -111,15 +127,13 @@ def pulled_by_length(
     fixed: Any, j: int, side: int, angle: float, lag: float, rub: float, pressure: float
 ) -> tuple[float, float, float]:
     """Return :func:`pulled` with friction of constant stiffness, whose limit has the pressure."""
-    contraction = contraction_at(fixed, j, side, angle)
-    shape, slope = shape_of(fixed, j, side, contraction)
+    shape, slope = shape_of(fixed, j, side, contraction_at(fixed, j, side, angle))
     passive, pressed = factors_of(fixed, j, side)
     factor = passive + pressed * pressure
     stiff = passive + pressed * REFERENCE_PRESSURE
-    more, steeper = more_force(fixed, j, side, contraction, pressure)
-    force = factor * shape - stiff * friction_of(fixed, j, side, lag) - rub + more
+    force = factor * shape - stiff * friction_of(fixed, j, side, lag) - rub
     tight = 1.0 if force > 0.0 else 0.0
-    return tight * force, tight * (factor * slope + steeper), tight * pressed * shape
+    return tight * force, tight * factor * slope, tight * pressed * shape
 
 
 @kernel
@@ -159,18 +173,16 @@ def pulled_at_pressure(
 ) -> tuple[float, float, float]:
     """Return the force of a bundle [N], and its growth with contraction [N/m] and pressure [m2].
 
-    ``rub`` is the yielding friction [N]. The growth with contraction is the law's, at a held
-    pressure; all are 0 for a slack bundle.
+    ``rub`` is the yielding friction [N], less the correction of the law. The growth with
+    contraction is that of the law without either, at a held pressure; all are 0 for a slack bundle.
     """
-    contraction = contraction_at(fixed, j, side, angle)
-    shape, slope = shape_of(fixed, j, side, contraction)
+    shape, slope = shape_of(fixed, j, side, contraction_at(fixed, j, side, angle))
     passive, pressed = factors_of(fixed, j, side)
     factor = passive + pressed * pressure
     felt = shape - friction_of(fixed, j, side, lag)
-    more, steeper = more_force(fixed, j, side, contraction, pressure)
-    force = factor * felt - rub + more
+    force = factor * felt - rub
     tight = 1.0 if force > 0.0 else 0.0
-    return tight * force, tight * (factor * slope + steeper), tight * pressed * felt
+    return tight * force, tight * factor * slope, tight * pressed * felt
 
 
 @kernel
@@ -215,13 +227,15 @@ def middle_torque(rows: Any, fixed: Any, j: int, work: Any) -> tuple[float, floa
         sign, lag = 2.0 * side - 1.0, lag_of(rows, j, side)
         before, after = work[WAS_A + side][j], work[NOW_A + side][j]
         rub, rubs = rub_of(rows, fixed, j, side, before), rub_of(rows, fixed, j, side, after)
-        was, soft, _ = pulled(fixed, j, side, angle, lag, rub, before)
-        now, hard, swell = pulled(fixed, j, side, angle, lag, rubs, after)
+        more, next_more, steeper = more_of(rows, j, side)
+        was, soft, _ = pulled(fixed, j, side, angle, lag, rub - more, before)
+        now, hard, swell = pulled(fixed, j, side, angle, lag, rubs - next_more, after)
         old, new = old + sign * radius * was, new + sign * radius * now
         growth = 0.5 * (soft + hard) - swell * work[GIVES_A + side][j] - stick_of(rows, j, side)
+        force, speed = 0.5 * (was + now), sign * radius * rows[K.VELOCITY][j]
+        growth = growth + (steeper if force > 0.0 else 0.0)
         slope = slope - radius * radius * growth
-        speed = sign * radius * rows[K.VELOCITY][j]
-        drag = drag_of(fixed, j, side, speed, 0.5 * (before + after), 0.5 * (was + now))
+        drag = drag_of(fixed, j, side, speed, 0.5 * (before + after), force)
         viscous = viscous + radius * radius * drag
     return old, new, slope, viscous
 
@@ -268,11 +282,13 @@ def advance(
             rows[K.AT_A][j] = travel_at(fixed, j, work[MIDDLE][j])
         slide(rows, fixed, counts, table, hysteresis, elements, 0, LANES)
         exchange_air(rows, fixed, counts, i, substeps, period, work)
+        correct_motion(rows, fixed, work)
         swing(rows, fixed, i, substeps, h, work)
         settle(rows, fixed, h, work)
     for j in range(LANES):
         rows[K.AT_A][j] = travel_at(fixed, j, rows[K.ANGLE][j])
     slide(rows, fixed, counts, table, hysteresis, elements, 0, LANES)
+    correct_report(rows, fixed)
     for j in range(LANES):
         report(rows, fixed, j)
     read_sensors(rows, fixed, counts[K.STEP], period)
@@ -286,7 +302,9 @@ def report(rows: Any, fixed: Any, j: int) -> None:
     for side in range(2):
         effective = rows[EFFECTIVE + side][j]
         lag, rub = lag_of(rows, j, side), rub_of(rows, fixed, j, side, effective)
-        force, growth, _ = pulled(fixed, j, side, angle, lag, rub, effective)
+        more, _, steeper = more_of(rows, j, side)
+        force, growth, _ = pulled(fixed, j, side, angle, lag, rub - more, effective)
+        growth = growth + (steeper if force > 0.0 else 0.0)
         speed = (2.0 * side - 1.0) * radius * velocity
         drag = drag_of(fixed, j, side, speed, effective, force)
         force = max(0.0, force - drag * speed) if drag > 0.0 else force
@@ -336,10 +354,12 @@ def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
 def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
     """Return the torque at rest [N m] at an angle, with the hysteresis lag of that angle."""
     torque, _ = passive_torque(fixed, j, angle)
+    correct_at(rows, fixed, j, angle)
     for side in range(2):
         effective = rows[EFFECTIVE + side][j]
         lag, rub = lag_of(rows, j, side), rub_of(rows, fixed, j, side, effective)
-        force, _, _ = pulled(fixed, j, side, angle, lag, rub, effective)
+        more, _, _ = more_of(rows, j, side)
+        force, _, _ = pulled(fixed, j, side, angle, lag, rub - more, effective)
         torque = torque + (2.0 * side - 1.0) * fixed[K.PULLEY_RADIUS][j] * force
     return torque + rows[K.DRIVE][j] + rows[K.DISTURBANCE][j] - fixed[K.WEARER_STIFFNESS][j] * angle
 

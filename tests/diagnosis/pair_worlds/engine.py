@@ -29,7 +29,11 @@ MUSCLE = (
     "viscous",  # [N s] per unit of contraction
     "creep",  # share of the pressure that follows
     "creep_s",  # its time constant [s]
+    "loss",  # force of Eyring's flow at 0.02 per second [N]
 )
+PACE = 1e-3
+"""Rate of contraction [1/s] below which Eyring's flow is in proportion to it."""
+
 VALVE = (
     "rate",  # eigenfrequency [rad/s], or reciprocal lag [1/s]
     "damping",
@@ -181,6 +185,8 @@ def run(
             strain[k] = e
             rub = (c[4] + c[5] * max(effective, 0.0)) * z[k]
             moving = c[7] * effective * rate * v[k // sides]
+            if c[10] > 0.0:
+                moving += c[10] * math.asinh(rate * v[k // sides] / PACE) / math.asinh(0.02 / PACE)
             base = law(kinds[0], c, effective, e)
             # friction ends with the force of a slack muscle
             force[k] = max(base - min(1.0, base / (0.05 * c[0])) * (rub + moving), 0.0)

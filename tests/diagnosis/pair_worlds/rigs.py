@@ -31,8 +31,10 @@ HIDDEN: dict[str, dict[str, float]] = {
     "valve_dead_band": {"band": 0.1},
     "unequal_muscles": {"unequal": 0.12},
     "sensor_delay": {"delay_s": 0.05},
+    "viscous_loss": {"loss": 0.03},
 }
-"""Strength of each effect that a rig may hide; stiction over the family's usual one."""
+"""Strength of each effect that a rig may hide; stiction over the family's usual one, the viscous
+loss over the size of a muscle."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,7 @@ def _muscles(
             "passive": family.passive * own,
             "friction": friction * own,
             "growth": 0.3 * friction * own,
+            "loss": hidden.get("loss", 0.0) * own,
         }
         made.append([values[name] for name in e.MUSCLE])
     return np.array(made * family.joints)
