@@ -1,4 +1,4 @@
-"""Diagnosis of joints, knees and arms in worlds of other laws of force, friction and regulators.
+"""Diagnosis of joints, orthoses and arms in worlds of other laws of force, friction and regulators.
 
 The rigs are those of :mod:`tests.diagnosis.pair_worlds`, in the world with regulators of first
 order; every one departs from the base in static law, loops, dead time and rate limit.
@@ -55,6 +55,15 @@ def test_knee_of_another_world_has_friction_of_the_length_and_a_corrected_law():
     means = study.blocks.means(study.normal.errors)
     some = study.blocks.counts.sum(axis=1) > 0
     assert np.sqrt(means[some]).max() < 3.0
+
+
+@needs_kernels
+def test_elbow_of_another_world_has_another_law_and_other_loops():
+    recording, sheet = record("elbow_orthosis", "exponential", 700_001)
+    found = diagnose(recording, rig=sheet, closed_loop=False, progress=False)
+    assert found.verdict == "named"
+    assert set(found.causes) == {"static_law", "hysteresis_shape"}
+    assert found.report["error_after"]["angle"]["times_floor"] < 1.2
 
 
 @needs_kernels

@@ -55,6 +55,22 @@ def test_hidden_effect_is_named_and_its_plant_goes_into_an_environment(family, t
         env.close()
 
 
+VISCOUS = {"muscle__viscosity": 600.0, "muscle__viscosity_speed": 2e-3}
+
+
+@needs_kernels
+@pytest.mark.parametrize("family", ["ELBOW", "KNEE"])
+def test_hidden_viscous_loss_of_an_orthosis_is_named_alone(family, tmp_path):
+    rig = getattr(family_rigs, family)
+    recording = rig.recorded(**VISCOUS)
+    found = diagnose(recording, rig.start, rig=rig.sheet, closed_loop=False, progress=False)
+    assert (found.verdict, found.causes) == ("named", ("viscous_loss",))
+    found.write(tmp_path)
+    env = gym.make(ENVIRONMENTS[family], plant=str(tmp_path / "plant.yaml"))
+    assert env.unwrapped.plant.value("muscle.viscosity") > 100.0
+    env.close()
+
+
 def assert_controllers_are_compared(found, family):
     """Assert that the paper's controller was compared, unless the environment takes no such arm."""
     loop, reason = found.report["closed_loop"], found.report["closed_loop_reason"]
