@@ -402,8 +402,8 @@ class Study:
         """Drop the common differences that the model of the decision does not need."""
         assert self.decision is not None
         if self.decision.level and any(cause.common for cause, _ in self.model.causes):
-            acting = self.flexible.acting(self.decision.model)
-            self.decision.model = self.flexible.needed(acting)
+            model = self.flexible.acting(self.decision.model)
+            self.decision.model = self.flexible.needed(model)
 
     def beside(self, base: Candidate) -> list[Cause]:
         """Return the causes that the recording can show beside the differences of a base."""

@@ -45,7 +45,7 @@ def stiffening(weight: float, linear: float, square: float, root: float) -> floa
 
 @dataclass(frozen=True, kw_only=True)
 class ViscosityEffects:
-    """Damping beside that of the load: at small speeds, and that grows with the pressure.
+    """Damping in addition to that of the load: at low speed, and growing with pressure.
 
     The damping of a muscle grows with its pressure, and is smaller in relaxation (reynolds2003).
     """
@@ -64,9 +64,10 @@ class ViscosityEffects:
         1.0, "1", 0.0, 2.0, "viscosity_per_pressure in relaxation over contraction", neutral=1.0
     )
 
-    def damping_at_rest(self, pressure: float) -> float:
-        """Return the damping [N s/m] of small contractions at an effective pressure [Pa]."""
-        return self.viscosity + self.viscosity_per_pressure * pressure
+    def largest_damping(self, pressure: float) -> float:
+        """Return the damping [N s/m] of slow motion at an effective pressure [Pa]."""
+        grown = self.viscosity_per_pressure * max(1.0, self.viscosity_relaxing)
+        return self.viscosity + grown * pressure
 
 
 VISCOSITY = parameter_rows(ViscosityEffects)
@@ -84,10 +85,10 @@ def viscous_damping(
 
 @kernel
 def taut_damping(fixed: Any, j: int, first: int, speed: float, drive: float, force: float) -> float:
-    """Return :func:`viscous_damping` [N s/m] of a muscle whose force [N] without it is known.
+    """Return the damping [N s/m] of a muscle, at most that which takes all its force.
 
-    A slack muscle has none, and a quick contraction has at most what takes all the force.
-    ``first`` is the first row of :class:`ViscosityEffects`.
+    ``force`` [N] is that without viscosity; a slack muscle has no damping. ``first`` is the first
+    row of :class:`ViscosityEffects`.
     """
     damping = viscous_damping(
         fixed[first + VISCOSITY.viscosity][j],

@@ -80,7 +80,7 @@ LOWEST = ROWS.map_00
 
 @kernel
 def correction_on(sizes: Any, first: int) -> int:
-    """Return the number of lanes and terms of a tile with a correction, in rows from ``first``."""
+    """Return the number of terms that are not 0 in all lanes of a tile, in rows from ``first``."""
     on = map_on(sizes, first)
     for k in range(len(LOWER_TERMS)):
         on = on + count_on(sizes[first + LOWEST + k], 0.0)

@@ -56,7 +56,7 @@ class FlowEffects:
     opening_band: float = assumed(
         3.4e4, "Pa", 1e3, 5e5, "error that opens fully: lag of 50 ms times 6.8e5 Pa/s"
     )
-    opening_bend: float = effect("1", -0.9, 1.0, "0: opening in proportion to error; 1: to square")
+    opening_bend: float = effect("1", -0.9, 1.0, "shape of opening by error: 0 linear, 1 quadratic")
     polytropic: float = assumed(
         1.0, "1", 1.0, 1.4, "of compression by motion alone; 1: isothermal, 1.4: adiabatic"
     )

@@ -3,8 +3,8 @@
 Dead time, slew limit, first-order lag, saturation.
 
 Its effects are those of valve, supply and line: static gain, rounded slew limit, dead band of a
-valve that closes, overlap of a spool, characteristic of the valve (rate over error), slower and
-choked exhaust, leak.
+valve that closes, overlap of a spool, nonlinear characteristic (rate against error), integral part
+of the controller, slower and choked exhaust, leak.
 """
 
 import math
@@ -131,16 +131,21 @@ class ValveEffects:
     overlap_leak: float = assumed(0.01, "1", 1e-4, 1.0, "gain within the overlap over the full one")
     exhaust_ratio: float = assumed(1.0, "1", 0.1, 20.0, "exhaust lag over filling lag", neutral=1.0)
     exhaust_taper: float = assumed(0.0, "1", 0.0, 1.0, "loss of exhaust_ratio at full pressure")
-    integral: float = effect("1/s2", 0.0, 1e4, "rate that an error adds per second, over the error")
+    integral: float = effect("1/s2", 0.0, 1e4, "integral gain: rate gained per second, over error")
     integral_release: float = assumed(
-        0.3, "s", 0.005, 1e3, "time in which it falls to a rate that the limits let through"
+        0.3, "s", 0.005, 1e3, "anti-windup: time constant by which rate limits drain it"
     )
     speed_2: float = assumed(
-        1.0, "1", 0.02, 20.0, "rate over error, at 2 % of full pressure over at none", neutral=1.0
+        1.0,
+        "1",
+        0.02,
+        20.0,
+        "rate over error at an error of 2 % of full pressure, relative to that at a small error",
+        neutral=1.0,
     )
-    speed_6: float = assumed(1.0, "1", 0.02, 20.0, "the same at 6 %", neutral=1.0)
-    speed_20: float = assumed(1.0, "1", 0.02, 20.0, "the same at 20 %", neutral=1.0)
-    speed_60: float = assumed(1.0, "1", 0.02, 20.0, "the same at 60 % and above", neutral=1.0)
+    speed_6: float = assumed(1.0, "1", 0.02, 20.0, "as speed_2, at 6 %", neutral=1.0)
+    speed_20: float = assumed(1.0, "1", 0.02, 20.0, "as speed_2, at 20 %", neutral=1.0)
+    speed_60: float = assumed(1.0, "1", 0.02, 20.0, "as speed_2, at 60 % and above", neutral=1.0)
     exhaust_rate: float = assumed(
         UNCHOKED, "1/s", 0.05, UNCHOKED, "choked exhaust over absolute pressure", neutral=UNCHOKED
     )
@@ -356,9 +361,9 @@ def lag_towards(
 
 @kernel
 def speed_at(fixed: Any, j: int, effects: int, error: float) -> float:
-    """Return the rate over the error, relative to that at none, for an error over full pressure.
+    """Return the rate over error, relative to that at a small error.
 
-    It is linear between the shares of full pressure at which it is given.
+    ``error`` is a share of full pressure; between the given shares the ratio is linear.
     """
     at_2, at_6 = fixed[effects + AIR.speed_2][j], fixed[effects + AIR.speed_6][j]
     at_20, at_60 = fixed[effects + AIR.speed_20][j], fixed[effects + AIR.speed_60][j]
@@ -455,7 +460,7 @@ def regulate_with_effects(
     lag = lag / within if abs(goal - pressure) < over else lag
     aim = goal + shift if goal < pressure else goal - shift
     gathered, gain = rows[state + AIR_STATE.integral][j], fixed[effects + AIR.integral][j]
-    aim = aim + lag * gathered
+    aim = aim + (lag * gathered if wide == 0.0 or opened > 0.0 else 0.0)
     slew = slew * (fixed[effects + AIR.slew_ratio][j] if aim < pressure else 1.0)
     reached = regulator_step(pressure, aim, lag, 1.0 / lag, slew, 1.0 / slew, h)
     free = (aim - pressure) * (1.0 - decay(h / lag))
@@ -470,15 +475,17 @@ def regulate_with_effects(
     reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
     # the valve closes when the error has fallen to the band
     stopped = min(reached, stop_high) if goal > pressure else max(reached, stop_low)
-    stopped = stopped if wide > 0.0 or gain == 0.0 else max(0.0, reached)
+    stopped = stopped if wide > 0.0 or gain == 0.0 else reached
+    stopped = max(0.0, stopped) if gain > 0.0 else stopped
     stays = opened if stopped == reached else 0.0
     rows[state + AIR_STATE.opened][j] = stays if h > 0.0 else before
     reached = stopped
     reached = pressure if target < 0.0 else reached
-    # the integral follows the rate that the limits let through
-    missed = (reached - pressure - free) / fixed[effects + AIR.integral_release][j]
-    gathered = gathered + h * gain * (goal - 0.5 * (pressure + reached)) + missed
-    rows[state + AIR_STATE.integral][j] = gathered if gain > 0.0 and target >= 0.0 else 0.0
+    # anti-windup: limits of the rate drain the integral
+    missed = (reached - pressure - free) / max(h, fixed[effects + AIR.integral_release][j])
+    summed = gathered + h * gain * (goal - 0.5 * (pressure + reached)) + missed
+    summed = summed if gain > 0.0 and target >= 0.0 else 0.0
+    rows[state + AIR_STATE.integral][j] = summed if h > 0.0 else gathered
     return leaked(rows, fixed, j, state, effects, rest, pressure, reached, h)
 
 
@@ -487,9 +494,9 @@ def regulate_with_leak(
     rows: Any, fixed: Any, j: int, state: int, effects: int, lag: float, slew: float, full: float,
     target: float, h: float,
 ) -> float:  # fmt: skip
-    """Return the same as :func:`regulate_with_effects` without bands, overlap, bend and choking.
+    """Return the same as :func:`regulate_with_effects` with the effects of a normal day.
 
-    Gain, evenly slower exhaust, supply and leak are left: the effects of a normal day.
+    These are gain, evenly slower exhaust, supply and leak.
     """
     pressure = rows[state + AIR_STATE.regulated][j]
     drop, rest = rows[state + AIR_STATE.drop][j], fixed[effects + AIR.supply_pressure][j]

@@ -39,9 +39,9 @@ class SensorEffects:
 
     drift: float = effect("{}/s", -1.0, 1.0, "at the start")
     drift_time: float = assumed(1e4, "s", 1.0, 1e4, "time in which the drift settles")
-    cycle_sine: float = effect("{}", -1.0, 1.0, "of a periodic drift, as of a room's temperature")
-    cycle_cosine: float = effect("{}", -1.0, 1.0, "of the same drift, less its start")
-    cycle_time: float = assumed(300.0, "s", 10.0, 1e5, "its period")
+    cycle_sine: float = effect("{}", -1.0, 1.0, "sine amplitude of a periodic drift, as by heating")
+    cycle_cosine: float = effect("{}", -1.0, 1.0, "cosine amplitude of that drift, 0 at the start")
+    cycle_time: float = assumed(300.0, "s", 10.0, 1e5, "period of that drift")
     ramp: float = effect("{}", -1.0, 1.0, "drift that ends")
     ramp_at: float = assumed(0.0, "s", 0.0, 1e6, "its middle")
     ramp_over: float = assumed(60.0, "s", 1.0, 1e6, "its duration")

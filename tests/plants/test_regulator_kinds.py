@@ -1,4 +1,4 @@
-"""Regulators whose rate is no multiple of the error: characteristic, integral part, opening."""
+"""Regulators with a characteristic, an integral part or a bent opening of the valve."""
 
 from typing import Any
 
@@ -70,11 +70,13 @@ def test_integral_part_overshoots_and_settles_on_the_setpoint() -> None:
 
 
 def test_integral_part_starts_again_behind_a_shut_valve() -> None:
-    command = np.concatenate([steps(4e5), np.full(30, -1.0), steps(4e5)])
-    made = pressures({"regulator.integral": 50.0}, command)
-    n = len(steps(0.0))
-    held = made[n : n + 30]
+    gain, n = {"regulator.integral": 50.0}, len(steps(0.0))
+    shut = np.concatenate([np.full(10, 4e5), np.full(30, -1.0), steps(4e5)])
+    made = pressures(gain, shut)
+    held = made[10:40]
     np.testing.assert_allclose(held, held[0], rtol=1e-12)
+    plain = pressures({}, np.concatenate([np.full(40, made[39]), steps(4e5)]))
+    assert made[-n] == pytest.approx(plain[-n], rel=0.02)  # the integral is 0 when it opens
 
 
 @pytest.mark.parametrize("bend", [-0.5, 0.0, 1.0])

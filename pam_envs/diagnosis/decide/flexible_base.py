@@ -130,7 +130,7 @@ class FlexibleBase:
         for cause in causes:
             shown = self.shown.get(cause.name)
             if shown is not None:
-                difference = replace(cause, common=True, by_nature=True), shown
+                difference = replace(cause, common=True), shown
             elif cause.common and not cause.in_valve:
                 difference = cause, together(cause.forms)
             else:
@@ -232,7 +232,8 @@ class FlexibleBase:
     def least_gain_of(self, cause: Cause, model: Candidate) -> float:
         """Return the gain from which a common difference of a model is named."""
         others = [c for c, _ in model.causes if c.name != cause.name]
-        apart = cause.by_nature or not any(c.lawlike for c in others)
+        apart = cause.by_nature or cause.name in self.shown
+        apart = apart or not any(c.lawlike for c in others)
         return self.rule.common_gain if apart else self.rule.lawlike_further
 
     def expected(self, model: Candidate) -> dict[str, float]:
@@ -273,7 +274,7 @@ class FlexibleBase:
         if not chosen or self.fits():
             return self.base
         model = self.needed(self.acting(self.fitted(chosen)))
-        model = self.with_needed_forms(self.sparse(self.begun(model)), causes)
+        model = self.with_needed_forms(self.sparse(self.begun(model)))
         if len(model.fit.frees) > len(self.base.fit.frees):
             model = refit(self.problem, self.blocks, model, 2)
         model = self.anchored(model)
@@ -342,10 +343,9 @@ class FlexibleBase:
         smaller = self.reduced(model, kept, z, SPARSE_ROUNDS)
         return smaller if self.blocks.gain(smaller.errors, model.errors) < SPARSE_LOSS else model
 
-    def with_needed_forms(self, model: Candidate, asked: Sequence[Cause]) -> Candidate:
+    def with_needed_forms(self, model: Candidate) -> Candidate:
         """Return a model without those forms of its differences that it hardly needs."""
-        present = set(model.names)
-        for cause in (c for c in asked if c.name in present and c.name not in self.shown):
+        for cause in (c for c, _ in model.causes if c.name not in self.shown):
             for form in cause.forms if len(cause.forms) > 1 else ():
                 names = [f.name for f in model.fit.frees]
                 group = [names.index(t.name) for t in form.terms if t.name in names]

@@ -107,7 +107,7 @@ class BoundElbow(RegulatedFamily):
             return columns[:, [self.plant.names.index(f"bundle_{side}.{name}")]]
 
         muscles, length = value("muscles"), value("nominal_length")
-        part, reach = value("gain") * self.abreast / muscles, value("largest_contraction") * length
+        part, reach = self.abreast / muscles, value("largest_contraction") * length
         passive = value("passive_base") + value("passive_each") * muscles
         pressed = part * (value("pressure_base") + value("pressure_each") * muscles)
         contraction = length * strain

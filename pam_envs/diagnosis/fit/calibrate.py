@@ -74,9 +74,9 @@ def calibrate(
     The regulator is fitted first, to the pressure alone, in several orders; then the static map
     and the friction by a regression of the force balance; then all parameters by simulation, from
     that guess and from the given plant. ``measured`` (channels, T) is NaN where there is no
-    reading, ``noise`` is its RMS (channels,), ``shapes`` those of :class:`Problem`; ``limit`` is a
-    limited rate, which the regulator may have, and ``causes`` are the others that act on the
-    pressure, beside which its kind is selected.
+    reading, ``noise`` is its RMS (channels,), ``shapes`` those of :class:`Problem`, ``limit`` the
+    cause of a rate limit. Of the other ``causes``, those that act on the pressure are tried in the
+    selection of the regulator.
     """
     pressure = np.where(np.isfinite(measured[1]), measured[1], np.maximum(0, family.inputs.command))
     states = states_of(measured[0], pressure, family.plant)
@@ -98,10 +98,10 @@ def calibrate(
     moved = np.isfinite(measured[0]).any() and plays
     if np.isfinite(measured[1]).any():
 
-        def law_of(family: MuscleFamily) -> Mapping[str, float]:
-            """Return parameters of the static law by the recorded pressure."""
-            found = smoothed(pressure, time)
-            balance = Balance.of(family, measured[0], found, noise[0]) if moved else None
+        def law_of(regulated: MuscleFamily) -> Mapping[str, float]:
+            """Return parameters of the static law, fitted with the recorded pressure."""
+            smooth = smoothed(pressure, time)
+            balance = Balance.of(regulated, measured[0], smooth, noise[0]) if moved else None
             return balance.flexible() if balance is not None else {}
 
         selection = Selection(problem, family, blocks, limit, causes, law_of)

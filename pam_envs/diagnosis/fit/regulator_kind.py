@@ -1,8 +1,8 @@
 """Kind of pressure regulator that a recording shows, selected by its pressure alone.
 
-An effect of the valve that acts in the recording makes one kind look like another. Dead time, leak
-and slower exhaust are therefore free while a kind is selected, and a kind beyond the lags of first
-and second order has to gain over these together with any one effect.
+An effect of the valve can make one kind look like another. Dead time, leak and slower exhaust are
+therefore free during the selection, and a kind other than a lag of first or second order has to be
+clearly better than such a lag with these and any one further effect.
 """
 
 import dataclasses
@@ -51,9 +51,10 @@ ORDER_GAIN = 0.05
 FITS = 1.2
 """Mean square of the pressure's residual over its noise below which no further kind is tried."""
 KIND_GAIN, TAIL_GAIN = 0.2, 0.3
-"""Gain that a further kind needs over the lags with one effect, and the slow tail."""
+"""Least gain of a further kind over the lags with one effect, and that of the slow tail."""
 SHOWN_GAIN, CLOSE, MOST_SHOWN = 0.5, 0.7, 3
-"""Gain from which the pressure shows an effect, share of it that no other may reach, and number."""
+"""Least gain of an effect that the pressure shows, share of it that no other effect may reach, and
+largest number of such effects."""
 PRESSURE, READING = ("regulator.", "pressure."), "pressure."
 TAIL, TAIL_FREQUENCY = "regulator.ring_share", "regulator.ring_frequency"
 TAIL_DAMPING = 2.0
@@ -67,7 +68,7 @@ CONDUCTANCES = (1e-10, 8e-10)
 INTEGRALS, RELEASES = (10.0, 40.0), (0.1, 0.5)
 """Gain [1/s2] and release time [s] of an integral part at which a fit starts."""
 CHARACTERISTICS = ((0.95, 0.9, 0.8, 0.6), (0.7, 0.5, 0.3, 0.15), (1.3, 1.6, 1.8, 1.9))
-"""Rates over error, of large errors over small ones, at which a fit starts."""
+"""Values of :data:`SPEEDS` at which a fit starts."""
 
 
 @dataclass(frozen=True)
@@ -85,15 +86,16 @@ class Selection:
     def selected(self) -> tuple[MuscleFamily, Fit, dict[str, Form]]:
         """Return the family with the regulator that the pressure needs, its fit, and effects.
 
-        The regulator is a lag of first or second order. If that lacks something: a lag with a slow
-        tail, one whose rate is no multiple of the error, one with an integral part, or orifices.
-        The effects are the forms of causes that the pressure clearly shows, as a limited rate.
+        The regulator is a lag of first or second order or, if that is not sufficient, one of four
+        others: a lag with a slow tail, with a rate not proportional to the error, or with an
+        integral part, or orifices. The effects are forms of causes that the pressure clearly shows,
+        such as a rate limit.
         """
         family, fit = self.kind()
         return family, *self.of(family).with_shown_effects(fit)
 
     def kind(self) -> tuple[MuscleFamily, Fit]:
-        """Return the family with the kind of regulator, and its fit with the effects aside."""
+        """Return the family with the selected regulator, and its fit with the effects aside."""
         family, fit = self.lags()
         if not self.lacks(fit):
             return family, fit
@@ -131,7 +133,7 @@ class Selection:
     def aside(self, family: MuscleFamily) -> tuple[Free, ...]:
         """Return effects that are free while a kind is selected, unless the base holds them.
 
-        The leak is one where the valve is shut in some samples.
+        The leak is free only if the valve is shut in some samples.
         """
         starts = {"regulator.dead_time": {"start": DELAY}}
         if family.plant.air != "flow":
@@ -142,7 +144,7 @@ class Selection:
         return tuple(family.free(n, **given) for n, given in starts.items() if n not in known)
 
     def with_effects(self, fit: Fit) -> dict[str, tuple[Form, Fit]]:
-        """Return the best form of each cause that a regulator's fit lacks, and the fit with it."""
+        """Return, for each cause that a fit lacks, its best form and the fit with it."""
         known, fits = {f.name for f in fit.frees}, []
         for cause in self.causes:
             for form in filter(self.acts, cause.forms):
@@ -163,9 +165,9 @@ class Selection:
         flows = self.family.plant.air == "flow"
         replaced = {f"regulator.{name}" for name in REPLACED} if flows else set()
         shut = bool(np.any(self.family.inputs.command < 0.0))
-        names = {t.name for t in form.terms}
+        names = {t.name for t in form.terms if t.amount}
         return (
-            all(t.name.startswith(PRESSURE) for t in form.terms if t.amount)
+            all(name.startswith(PRESSURE) for name in names)
             and not names & replaced
             and (shut or "regulator.leak" not in names)
         )
@@ -182,7 +184,7 @@ class Selection:
         """
         fit, shown = self.with_limit(fit)
         while len(shown) < MOST_SHOWN and self.lacks(fit):
-            found = self.with_effects(fit)
+            found = {n: made for n, made in self.with_effects(fit).items() if n not in shown}
             gains = sorted((self.gain(fit, more), name) for name, (_, more) in found.items())
             if not gains or gains[-1][0] < SHOWN_GAIN:
                 break
@@ -195,7 +197,7 @@ class Selection:
         return fit, shown
 
     def with_limit(self, fit: Fit) -> tuple[Fit, dict[str, Form]]:
-        """Return a fit without other effects than a limit of its rate that it needs."""
+        """Return a fit whose only effect is a rate limit, if needed, and that form by cause."""
         known = fit.values()
         form = next((f for f in self.limit.forms if all(t.name in known for t in f.terms)), None)
         less = self.without(fit, ())
@@ -208,7 +210,7 @@ class Selection:
         return limited, {self.limit.name: form}
 
     def without(self, fit: Fit, terms: Sequence[Term]) -> Fit:
-        """Return the fit of a regulator with no other effects than some terms."""
+        """Return a fit with the regulator, some terms and no other effects."""
         kept = {f.name for f in regulator_of(self.family)} | {t.name for t in terms}
         return self.less(fit, [f.name for f in fit.frees if f.name not in kept])
 
@@ -216,12 +218,15 @@ class Selection:
         """Return a fit without some parameters, which take the values of the plant."""
         frees = tuple(f for f in fit.frees if f.name not in names)
         z = np.array([v for f, v in zip(fit.frees, fit.z, strict=True) if f.name not in names])
-        made = restarted(fit, frees=frees, z=z, column=self.family.column, shared=None)
+        column = fit.column.copy()
+        gone = [f.place for f in fit.frees if f.name in names]
+        column[gone] = self.family.column[gone]
+        made = restarted(fit, frees=frees, z=z, column=column, shared=None)
         evaluate(self.only, [made])
         return self.simplest([made], LONG_ROUNDS)
 
     def spare(self, fit: Fit, form: Form) -> tuple[Fit, Form]:
-        """Return a fit without those terms that only shape an effect and that it does not need."""
+        """Return a fit and a form without the shape terms that they do not need."""
         terms = form.terms
         for term in terms:
             if not term.amount:
@@ -252,7 +257,7 @@ class Selection:
         yield with_values(other, made, (TAIL, TAIL_FREQUENCY)), made
 
     def characteristic(self, family: MuscleFamily, fit: Fit) -> Iterator[tuple[MuscleFamily, Fit]]:
-        """Yield the lag, of first or second order, whose rate is no multiple of the error."""
+        """Yield the lag, of first or second order, whose rate is not proportional to the error."""
         plant = family.plant
         if plant.air == "flow" or any(plant.value(n) != plant.neutral[n] for n in SPEEDS):
             return

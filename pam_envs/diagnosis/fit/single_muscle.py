@@ -67,7 +67,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.source_pressure": {"log": True, "prior": 0.5},
     "regulator.pilot_lag": {"log": True, "low": 2e-3, "prior": 2.0},
     "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
-    "regulator.integral": {"high": 1e3, "scale": 10.0, "prior": 10.0},
+    "regulator.integral": {"high": 300.0, "scale": 10.0, "prior": 10.0},
     "regulator.integral_release": {"log": True, "prior": 2.0},
     **{name: {"log": True, "low": 0.03, "high": 10.0, "prior": 1.5} for name in SPEEDS},
 }
@@ -250,6 +250,7 @@ class MuscleFamily:
         names = [name for name in BASE if not (flows and name == LAG)]
         names += [*((*ORIFICES, BORE) if flows else ()), *((CLOCK,) if self.clock > 0.0 else ())]
         names += [name for name in PILOT if self.plant.regulator.pilot_lag > 0.0]
+        names += [name for name in INTEGRAL if self.plant.regulator.integral > 0.0]
         names += [f"hysteresis.weight[{k}]" for k in range(self.plant.elements)]
         present = [
             name

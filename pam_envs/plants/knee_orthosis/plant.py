@@ -157,7 +157,7 @@ class KneeOrthosis(Plant, rows=K):
         """Refuse too fast a motion, and a strap with which the wire opens past its toggle."""
         lever, leg, hold = self.lever, self.leg, 0.0
         inertia, damping = lever.inertia, lever.damping
-        viscous = self.muscle.damping_at_rest(self.regulator.max_pressure)
+        viscous = self.muscle.largest_damping(self.regulator.max_pressure)
         damping += viscous * lever.arm**2
         if self.mounting == "leg":
             inertia += leg.inertia

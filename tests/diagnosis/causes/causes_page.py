@@ -35,7 +35,7 @@ GIVEN = {
     "regulator.pilot_damping": "the base, as `regulator.pilot_lag`",
     "regulator.integral": "the base, where the pressure shows an integral part",
     "regulator.integral_release": "the base, as `regulator.integral`",
-    "regulator.speed_2": "the base, where the rate of the pressure is no multiple of the error",
+    "regulator.speed_2": "the base, where the rate is not proportional to the error",
     "regulator.speed_6": "the base, as `regulator.speed_2`",
     "regulator.speed_20": "the base, as `regulator.speed_2`",
     "regulator.speed_60": "the base, as `regulator.speed_2`",

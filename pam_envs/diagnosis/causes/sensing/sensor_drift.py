@@ -2,8 +2,8 @@
 
 Electronics warm up, a clamp or a coating settles, a bridge amplifier follows the room temperature.
 The error depends on time alone, not on the muscle: it settles exponentially, or changes between two
-moments and then is constant, or follows the cycle of a heating beside a steady drift. A change
-within 40 s is a bias.
+moments and then is constant, or is periodic, as by the heating of a room, beside a steady drift. A
+change within 40 s is a bias.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from pam_envs.diagnosis.causes.sensing.sensor_bias import LONGEST
 from pam_envs.diagnosis.fit.starting_values import Starts, changes_of
 
 CYCLES = (200.0, 350.0)
-"""Starting values of the period of a heating [s]."""
+"""Starting values of the period [s]."""
 SLOW = (50.0, 150.0)
 """Starting values of the duration of a slow change [s]."""
 
