@@ -40,7 +40,6 @@ from pam_envs.diagnosis.report.report import plain
 from pam_envs.diagnosis.report.summary import report_of
 from pam_envs.diagnosis.report.summary_causes import judged
 from pam_envs.plants.core.plant import UnstableParameters
-from pam_envs.pneumatics.flow import REPLACED
 
 UNDECLARED, BELIEVED = 1.15, 1.5
 """Noise over the estimate from repeats or holds: without a declaration, and the largest declared
@@ -183,11 +182,10 @@ def acting(causes: Sequence[Cause], plant: Any) -> tuple[list[Cause], list[str]]
     """Return causes with the forms that act on a plant, and the names of those without any."""
     if getattr(plant, "air", "regulator") != "flow":
         return list(causes), []
-    without = {f"regulator.{name}" for name in REPLACED}
 
     def acts(form: Form) -> bool:
         """Return whether no amount of a form is replaced."""
-        return not any(term.amount and term.name in without for term in form.terms)
+        return not any(term.amount and term.name in plant.inert for term in form.terms)
 
     made = [replace(c, forms=tuple(filter(acts, c.forms))) for c in causes]
     return [c for c in made if c.forms], [c.name for c in made if not c.forms]

@@ -242,9 +242,7 @@ class FlexibleBase:
         Refits lose more, since bounds stop them. It is 0 where the difference has no neutral value
         in the coordinates of the fit.
         """
-        complete_jacobian(self.problem, model.fit)
-        normal, _ = lsq.normal_equations(self.problem, model.fit)
-        spread = np.linalg.pinv(normal, hermitian=True)
+        spread = self.spread(model)
         fit, plain, found = model.fit, self.plain(model.fit), {}
         names = [f.name for f in fit.frees]
         for cause, form in model.causes:
@@ -258,6 +256,12 @@ class FlexibleBase:
             more = float(moved @ np.linalg.pinv(spread[np.ix_(places, places)]) @ moved)
             found[cause.name] = float(np.log1p(more / max(fit.cost, 1e-12)))
         return found
+
+    def spread(self, model: Candidate) -> Array:
+        """Return the covariance of a model's coordinates by a linear model of its residual."""
+        complete_jacobian(self.problem, model.fit)
+        normal, _ = lsq.normal_equations(self.problem, model.fit)
+        return np.asarray(np.linalg.pinv(normal, hermitian=True))
 
     def loss(self, smaller: Candidate, model: Candidate) -> float:
         """Return the gain lost without a cause beyond that which the rule asks of it.
@@ -316,14 +320,11 @@ class FlexibleBase:
         Those within :data:`SHOWN` standard deviations of the plain plant take its values, one after
         the other by a linear model of the residual.
         """
-        complete_jacobian(self.problem, model.fit)
-        fit, plain = model.fit, self.plain(model.fit)
-        normal, _ = lsq.normal_equations(self.problem, fit)
+        fit, plain, spread = model.fit, self.plain(model.fit), self.spread(model)
         known = {f.name for f in self.base.fit.frees}
         free = [k for k, f in enumerate(fit.frees) if f.name not in known and np.isfinite(plain[k])]
         limit = SHOWN**2 * max(1.0, fit.cost / self.problem.sampled)
         kept, z = np.ones(len(plain), bool), fit.z
-        spread = np.linalg.pinv(normal, hermitian=True)
         while free:
             off = z[free] - plain[free]
             worse = off**2 / np.maximum(np.diag(spread)[free], 1e-300)
@@ -349,14 +350,12 @@ class FlexibleBase:
             for form in cause.forms if len(cause.forms) > 1 else ():
                 names = [f.name for f in model.fit.frees]
                 group = [names.index(t.name) for t in form.terms if t.name in names]
-                if not group or not any(t.amount and t.name in names for t in form.terms):
+                if not any(t.amount and t.name in names for t in form.terms):
                     continue
-                complete_jacobian(self.problem, model.fit)
-                normal, _ = lsq.normal_equations(self.problem, model.fit)
-                columns = np.linalg.pinv(normal, hermitian=True)[group]
                 off = model.fit.z[group] - self.plain(model.fit)[group]
                 if not np.isfinite(off).all():
                     continue
+                columns = self.spread(model)[group]
                 z = model.fit.z - columns.T @ np.linalg.pinv(columns[:, group]) @ off
                 kept = np.ones(len(names), bool)
                 kept[group] = False

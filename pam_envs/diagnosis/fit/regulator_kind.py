@@ -6,7 +6,7 @@ clearly better than such a lag with these and any one further effect.
 """
 
 import dataclasses
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -70,6 +70,9 @@ INTEGRALS, RELEASES = (10.0, 40.0), (0.1, 0.5)
 CHARACTERISTICS = ((0.95, 0.9, 0.8, 0.6), (0.7, 0.5, 0.3, 0.15), (1.3, 1.6, 1.8, 1.9))
 """Values of :data:`SPEEDS` at which a fit starts."""
 
+Made = tuple[MuscleFamily, Fit]
+"""A family with a kind of regulator, and its fit; a kind that cannot be tried gives None."""
+
 
 @dataclass(frozen=True)
 class Selection:
@@ -110,9 +113,9 @@ class Selection:
         for kind, least in further:
             if not self.lacks(reached):
                 break
-            for other, made in kind(family, fit):
-                if self.gain(reached, made) >= least:
-                    best, reached = (other, made), made
+            made = kind(family, fit)
+            if made is not None and self.gain(reached, made[1]) >= least:
+                best, reached = made, made[1]
         return best
 
     def lags(self) -> tuple[MuscleFamily, Fit]:
@@ -138,15 +141,18 @@ class Selection:
         starts = {"regulator.dead_time": {"start": DELAY}}
         if family.plant.air != "flow":
             starts["regulator.exhaust_ratio"] = {"start": 1.0, "log": True}
-        if np.any(family.inputs.command < 0.0):
+        if is_shut(family):
             starts["regulator.leak"] = {"start": LEAK, "scale": LEAK}
         known = {free.name for free in family.base()}
         return tuple(family.free(n, **given) for n, given in starts.items() if n not in known)
 
-    def with_effects(self, fit: Fit) -> dict[str, tuple[Form, Fit]]:
-        """Return, for each cause that a fit lacks, its best form and the fit with it."""
+    def with_effects(self, fit: Fit, but: Collection[str] = ()) -> dict[str, tuple[Form, Fit]]:
+        """Return, for each cause that a fit lacks, its best form and the fit with it.
+
+        ``but`` are names of causes that are left out.
+        """
         known, fits = {f.name for f in fit.frees}, []
-        for cause in self.causes:
+        for cause in (c for c in self.causes if c.name not in but):
             for form in filter(self.acts, cause.forms):
                 for values in form.starts if not any(t.name in known for t in form.terms) else ():
                     frees = frees_for(self.family, form, values)
@@ -162,14 +168,11 @@ class Selection:
 
     def acts(self, form: Form) -> bool:
         """Return whether a form acts on the pressure alone, and on this kind of regulator."""
-        flows = self.family.plant.air == "flow"
-        replaced = {f"regulator.{name}" for name in REPLACED} if flows else set()
-        shut = bool(np.any(self.family.inputs.command < 0.0))
         names = {t.name for t in form.terms if t.amount}
         return (
             all(name.startswith(PRESSURE) for name in names)
-            and not names & replaced
-            and (shut or "regulator.leak" not in names)
+            and not names & self.family.plant.inert
+            and ("regulator.leak" not in names or is_shut(self.family))
         )
 
     def with_one_effect(self, fit: Fit) -> Fit:
@@ -184,7 +187,7 @@ class Selection:
         """
         fit, shown = self.with_limit(fit)
         while len(shown) < MOST_SHOWN and self.lacks(fit):
-            found = {n: made for n, made in self.with_effects(fit).items() if n not in shown}
+            found = self.with_effects(fit, shown)
             gains = sorted((self.gain(fit, more), name) for name, (_, more) in found.items())
             if not gains or gains[-1][0] < SHOWN_GAIN:
                 break
@@ -235,14 +238,14 @@ class Selection:
                     fit, terms = less, tuple(t for t in terms if t is not term)
         return fit, dataclasses.replace(form, terms=terms)
 
-    def slow_tail(self, family: MuscleFamily, fit: Fit) -> Iterator[tuple[MuscleFamily, Fit]]:
-        """Yield the lag with a share of the pressure that follows slowly.
+    def slow_tail(self, family: MuscleFamily, fit: Fit) -> Made | None:
+        """Return the lag with a share of the pressure that follows slowly.
 
         Air that flows into dead volumes, or an integrating pilot, gives such a tail.
         """
         plant = family.plant
         if any(plant.value(name) != plant.neutral[name] for name in (TAIL, "regulator.ring_flow")):
-            return
+            return None
         overdamped = {"regulator.ring_damping": TAIL_DAMPING}
         other = dataclasses.replace(family, plant=plant.replace(overdamped))
         column = column_of(fit, fit.z)
@@ -254,13 +257,13 @@ class Selection:
             turns = other.free(TAIL_FREQUENCY, start=hertz, high=TAIL_FASTEST, log=True)
             fits.append(Fit.at_start((*frees, share, turns), column))
         made = self.simplest(fits)
-        yield with_values(other, made, (TAIL, TAIL_FREQUENCY)), made
+        return with_values(other, made, (TAIL, TAIL_FREQUENCY)), made
 
-    def characteristic(self, family: MuscleFamily, fit: Fit) -> Iterator[tuple[MuscleFamily, Fit]]:
-        """Yield the lag, of first or second order, whose rate is not proportional to the error."""
+    def characteristic(self, family: MuscleFamily, fit: Fit) -> Made | None:
+        """Return the lag, of first or second order, whose rate is not proportional to the error."""
         plant = family.plant
         if plant.air == "flow" or any(plant.value(n) != plant.neutral[n] for n in SPEEDS):
-            return
+            return None
         given = dict(zip(SPEEDS, CHARACTERISTICS[0], strict=True))
         other = dataclasses.replace(family, plant=plant.replace(given)).finer(FINE_STEP)
         fits = []
@@ -272,13 +275,13 @@ class Selection:
             if not known & set(PILOT):
                 fits.append(Fit.at_start((*frees, *pilot_of(other)), other.column))
         made = self.of(other).simplest(fits, LONG_ROUNDS)
-        yield with_values(other, made, (*SPEEDS, *PILOT)), made
+        return with_values(other, made, (*SPEEDS, *PILOT)), made
 
-    def integral(self, family: MuscleFamily, fit: Fit) -> Iterator[tuple[MuscleFamily, Fit]]:
-        """Yield the lag with a controller that also has an integral part."""
+    def integral(self, family: MuscleFamily, fit: Fit) -> Made | None:
+        """Return the lag with a controller that also has an integral part."""
         plant = family.plant
         if plant.air == "flow" or plant.regulator.integral != 0.0:
-            return
+            return None
         other, column = family.finer(FINE_STEP), column_of(fit, fit.z)
         frees = start_at_guess(fit.frees, fit.values())
         fits = []
@@ -287,15 +290,15 @@ class Selection:
             time = other.free(INTEGRAL[1], start=release)
             fits.append(Fit.at_start((*frees, gain, time), column))
         made = self.of(other).simplest(fits, LONG_ROUNDS)
-        yield with_values(other, made, INTEGRAL), made
+        return with_values(other, made, INTEGRAL), made
 
-    def orifices(self, family: MuscleFamily, fit: Fit) -> Iterator[tuple[MuscleFamily, Fit]]:
-        """Yield the plant with flow through orifices.
+    def orifices(self, family: MuscleFamily, fit: Fit) -> Made | None:
+        """Return the plant with flow through orifices.
 
         The muscle, whose volume is filled, is that of the family or one with another law.
         """
         if not can_flow(self.family):
-            return
+            return None
         other = dataclasses.replace(family, plant=orifices_of(family.plant)).finer(FINE_STEP)
         law = self.law(family)
         full = family.plant.regulator.max_pressure
@@ -306,7 +309,7 @@ class Selection:
             frees = start_at_guess((*regulator_of(other), *self.aside(other)), begin)
             fits += [Fit.at_start(frees, column) for column in columns]
         of = self.of(other)
-        yield other, of.simplest(promising(of.only, fits), LONG_ROUNDS)
+        return other, of.simplest(promising(of.only, fits), LONG_ROUNDS)
 
     def of(self, family: MuscleFamily) -> "Selection":
         """Return the selection with the simulation of another family."""
@@ -339,6 +342,11 @@ class Selection:
     def simplest(self, fits: list[Fit], rounds: int = GUESS_ROUNDS) -> Fit:
         """Return the best of some fits; one with more parameters needs a gain."""
         return simplest(self.only, self.blocks, fits, rounds)
+
+
+def is_shut(family: MuscleFamily) -> bool:
+    """Return whether the valve is shut in some samples."""
+    return bool(np.any(family.inputs.command < 0.0))
 
 
 def regulator_of(family: MuscleFamily) -> tuple[Free, ...]:

@@ -1,27 +1,17 @@
 """Regression of the force balance."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from pam_envs.arrays import Array
 from pam_envs.diagnosis.fit.balance import Balance
-from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, inputs_of, start_plant
+from pam_envs.diagnosis.fit.single_muscle import MuscleFamily
 from pam_envs.muscle.effects import MAP_TERMS
-from tests.diagnosis.conftest import needs_kernels, recorded
-from tests.diagnosis.hidden import Campaign
+from tests.diagnosis.conftest import needs_kernels
 
 NOISE = 5e-5
 
 pytestmark = needs_kernels
-
-
-@pytest.fixture(scope="module")
-def family(short: Campaign, tmp_path_factory: pytest.TempPathFactory) -> MuscleFamily:
-    folder: Path = tmp_path_factory.mktemp("recording")
-    recording, rig = recorded(folder, "creep", 0.0, short)
-    return MuscleFamily(start_plant(rig), inputs_of(recording, rig), 0.04)
 
 
 def balance(family: MuscleFamily, **values: float) -> Balance:

@@ -1,7 +1,5 @@
 """Selection of the kind of regulator by the pressure alone, beside effects of its valve."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -9,21 +7,13 @@ from pam_envs.diagnosis.causes import by_name, catalogue
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.least_squares import Problem
 from pam_envs.diagnosis.fit.regulator_kind import Selection
-from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, inputs_of, start_plant
-from tests.diagnosis.conftest import needs_kernels, recorded
-from tests.diagnosis.hidden import Campaign
+from pam_envs.diagnosis.fit.single_muscle import MuscleFamily
+from tests.diagnosis.conftest import needs_kernels
 
 NOISE = np.array([5e-5, 1e3])
 FILLS = {"regulator.time_constant": 0.06}
 
 pytestmark = needs_kernels
-
-
-@pytest.fixture(scope="module")
-def family(short: Campaign, tmp_path_factory: pytest.TempPathFactory) -> MuscleFamily:
-    folder: Path = tmp_path_factory.mktemp("recording")
-    recording, rig = recorded(folder, "creep", 0.0, short)
-    return MuscleFamily(start_plant(rig), inputs_of(recording, rig), 0.04)
 
 
 def selected(family: MuscleFamily, values: dict[str, float]) -> tuple[MuscleFamily, list[str]]:
