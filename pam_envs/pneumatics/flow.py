@@ -23,7 +23,7 @@ SWITCH = "regulator.flow"
 """Parameter that selects one of ``AIRS``, 0 or 1."""
 REPLACED = (
     *("slew_bend", "slew_ratio", "overlap", "exhaust_ratio", "exhaust_rate", "pilot_lag"),
-    *("pilot_damping", "overlap_leak", "exhaust_taper", "dead_close", "supply_time"),
+    *("pilot_damping", "rate_lag", "overlap_leak", "exhaust_taper", "dead_close", "supply_time"),
     *("time_constant", "slew_rate", "supply_effect"),
     *("speed_2", "speed_6", "speed_20", "speed_60", "integral", "integral_release"),
 )

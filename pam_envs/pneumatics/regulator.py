@@ -3,8 +3,8 @@
 Dead time, slew limit, first-order lag, saturation.
 
 Its effects are those of valve, supply and line: static gain, rounded slew limit, dead band of a
-valve that closes, overlap of a spool, nonlinear characteristic (rate against error), integral part
-of the controller, slower and choked exhaust, leak.
+valve that closes, overlap of a spool, nonlinear characteristic (rate against error), lag of the
+rate, integral part of the controller, slower and choked exhaust, leak.
 """
 
 import math
@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.kernels.arithmetic import TURN, count_on, decay
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.kernels.motion import note, noted, resonator_step
+from pam_envs.kernels.motion import damped_motion, note, noted, resonator_step
 from pam_envs.parameters import assumed, derived, effect, named_rows, parameter_rows, published
 from pam_envs.pneumatics.flow import FlowEffects, usual_conductance
 
@@ -152,6 +152,7 @@ class ValveEffects:
     leak: float = effect("1/s", 0.0, 10.0, "pressure lost over pressure")
     pilot_lag: float = effect("s", 0.0, 1.0, "one over the natural frequency of a pilot stage")
     pilot_damping: float = assumed(1.0, "1", 0.1, 5.0, "damping ratio of the pilot stage")
+    rate_lag: float = effect("s", 0.0, 1.0, "lag of the rate, which stays within slew_rate")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,6 +171,7 @@ class RegulatorEffects(FlowEffects, LineEffects, SupplyEffects, ValveEffects):
         ("exhaust_rate",),
         ("leak",),
         ("pilot_lag", "pilot_damping"),
+        ("rate_lag",),
         ("supply_pressure", "supply_droop", "supply_time", "supply_recovery"),
         ("supply_effect",),
         ("ring_share", "ring_flow", "ring_frequency", "ring_damping"),
@@ -251,7 +253,7 @@ AIR = parameter_rows(RegulatorEffects)
 """Rows of the effects of valve, supply and line, from the first."""
 AIR_STATE = named_rows(
     *("regulated", "opened", "drop", "lost", "line", "line_rate", "pilot", "pilot_rate"),
-    *("integral", "space", "here", "gives", "ahead", "slope"),
+    *("integral", "rate", "space", "here", "gives", "ahead", "slope"),
 )
 """Rows of the state of valve, supply and line, from the first, with the pressure that the leak has
 lost in the control period [Pa] (``lost``); then those of the air in the muscle:
@@ -398,8 +400,8 @@ def leaked(
     return kept  # type: ignore[no-any-return]
 
 
-SHORTEST_PILOT = 0.25
-"""Shortest lag of a pilot stage that a step follows, over the step."""
+SHORTEST = 0.25
+"""Shortest lag of second order that a step follows, over the step."""
 
 
 @kernel
@@ -419,7 +421,7 @@ def pilot_step(
         rows[state + AIR_STATE.pilot][j] = pressure
         rows[state + AIR_STATE.pilot_rate][j] = 0.0
         return target
-    slow = max(lag, SHORTEST_PILOT * h, 1e-9)
+    slow = max(lag, SHORTEST * h, 1e-9)
     turns = 1.0 / (TURN * slow)
     ratio = fixed[effects + AIR.pilot_damping][j]
     before, pace = rows[state + AIR_STATE.pilot][j], rows[state + AIR_STATE.pilot_rate][j]
@@ -427,6 +429,32 @@ def pilot_step(
     # the equation of the lag, integrated over the step
     missing = slow * (slow * (rate - pace) + 2.0 * ratio * (behind - before))
     return max(0.0, target - missing / h)
+
+
+PARTS = 4
+"""Parts of a step in which the rate may reach its limit."""
+
+
+@kernel
+def lagged_step(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, aim: float, lag: float, slew: float,
+    h: float,
+) -> float:  # fmt: skip
+    """Return the pressure [Pa] of lane ``j`` after ``h`` seconds with a lag of its rate.
+
+    The rate follows ``(aim - pressure) / lag`` with the time constant ``rate_lag``, within
+    ``slew``.
+    """
+    pressure, rate = rows[state + AIR_STATE.regulated][j], rows[state + AIR_STATE.rate][j]
+    part = h / PARTS
+    damping = 1.0 / max(fixed[effects + AIR.rate_lag][j], SHORTEST * part)
+    k, damped = damping / max(lag, SHORTEST * part), decay(0.5 * damping * part)
+    for _ in range(PARTS):
+        moved, rate = damped_motion(rate, k * (aim - pressure), 0.0, k, damping, damped, part)
+        pressure = pressure + max(-slew * part, min(slew * part, moved))
+        rate = max(-slew, min(slew, rate))
+    rows[state + AIR_STATE.rate][j] = rate
+    return pressure
 
 
 @kernel
@@ -464,23 +492,32 @@ def regulate_with_effects(
     slew = slew * (fixed[effects + AIR.slew_ratio][j] if aim < pressure else 1.0)
     reached = regulator_step(pressure, aim, lag, 1.0 / lag, slew, 1.0 / slew, h)
     free = (aim - pressure) * (1.0 - decay(h / lag))
-    most = slew * max(h, 1e-9)
+    late = fixed[effects + AIR.rate_lag][j] > 0.0 and h > 0.0
+    if late:
+        rate = rows[state + AIR_STATE.rate][j]
+        free = lagged_step(rows, fixed, j, state, effects, aim, lag, NO_SLEW_LIMIT, h) - pressure
+        rows[state + AIR_STATE.rate][j] = rate
+        reached = lagged_step(rows, fixed, j, state, effects, aim, lag, slew, h)
+    moved, most = reached, slew * max(h, 1e-9)
     rounded = pressure + free * most / math.sqrt(free * free + most * most)
     bend = fixed[effects + AIR.slew_bend][j] if slew < NO_SLEW_LIMIT else 0.0
     reached = reached + bend * (rounded - reached)
-    rate = fixed[effects + AIR.exhaust_rate][j]
-    choked = (pressure + ATMOSPHERE) * decay(rate * h) - ATMOSPHERE
-    reached = reached if rate >= UNCHOKED else max(reached, min(pressure, choked))
+    choke = fixed[effects + AIR.exhaust_rate][j]
+    choked = (pressure + ATMOSPHERE) * decay(choke * h) - ATMOSPHERE
+    reached = reached if choke >= UNCHOKED else max(reached, min(pressure, choked))
     rest = fixed[effects + AIR.supply_pressure][j]
     reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
     # the valve closes when the error has fallen to the band
     stopped = min(reached, stop_high) if goal > pressure else max(reached, stop_low)
-    stopped = stopped if wide > 0.0 or gain == 0.0 else reached
-    stopped = max(0.0, stopped) if gain > 0.0 else stopped
+    swings = gain > 0.0 or late
+    stopped = reached if swings and wide == 0.0 else stopped
+    stopped = max(0.0, stopped) if swings else stopped
     stays = opened if stopped == reached else 0.0
     rows[state + AIR_STATE.opened][j] = stays if h > 0.0 else before
     reached = stopped
     reached = pressure if target < 0.0 else reached
+    if late and reached != moved:  # other limits hold the rate too, and a shut valve ends it
+        rows[state + AIR_STATE.rate][j] = (reached - pressure) / h
     # anti-windup: limits of the rate drain the integral
     missed = (reached - pressure - free) / max(h, fixed[effects + AIR.integral_release][j])
     summed = gathered + h * gain * (goal - 0.5 * (pressure + reached)) + missed
@@ -527,6 +564,7 @@ def begin_air(rows: Any, j: int, state: int, pressure: float) -> None:
     rows[state + AIR_STATE.pilot][j], rows[state + AIR_STATE.pilot_rate][j] = pressure, 0.0
     rows[state + AIR_STATE.opened][j] = rows[state + AIR_STATE.drop][j] = 0.0
     rows[state + AIR_STATE.lost][j] = rows[state + AIR_STATE.integral][j] = 0.0
+    rows[state + AIR_STATE.rate][j] = 0.0
     rows[state + AIR_STATE.line_rate][j] = rows[state + AIR_STATE.space][j] = 0.0
     rows[state + AIR_STATE.ahead][j] = rows[state + AIR_STATE.slope][j] = 0.0
 
@@ -549,6 +587,7 @@ def valve_effects_on(fixed: Any, effects: int) -> int:
         + count_on(fixed[effects + AIR.slew_bend], 0.0)
         + count_on(fixed[effects + AIR.slew_ratio], 1.0)
         + count_on(fixed[effects + AIR.pilot_lag], 0.0)
+        + count_on(fixed[effects + AIR.rate_lag], 0.0)
         + count_on(fixed[effects + AIR.exhaust_taper], 0.0)
         + count_on(fixed[effects + AIR.integral], 0.0)
         + count_on(fixed[effects + AIR.speed_2], 1.0)

@@ -1,4 +1,4 @@
-"""Regulators with a characteristic, an integral part or a bent opening of the valve."""
+"""Regulators with a characteristic, a lag of the rate, an integral part or a bent opening."""
 
 from typing import Any
 
@@ -50,6 +50,28 @@ def test_rate_follows_the_characteristic() -> None:
     expected = solved(rates, command, np.zeros(1))
     assert np.abs(made - pressures({}, command)).max() > 2e4
     np.testing.assert_allclose(made, expected, atol=1.5e3)
+
+
+@pytest.mark.parametrize("late", [0.02, 0.1])
+def test_rate_lags_within_its_limit(late: float) -> None:
+    command, most = steps(4e5, 1e5, 1.1e5, 5.5e5), 1e6
+
+    def rates(_: float, state: Any, target: float) -> Any:
+        p, rate = state[0], np.clip(state[1], -most, most)
+        more = ((target - p) / LAG - rate) / late
+        return [rate, 0.0 if abs(state[1]) >= most and more * state[1] > 0.0 else more]
+
+    limit = {"regulator.slew_rate": most}
+    made = pressures(limit | {"regulator.rate_lag": late}, command)
+    expected = solved(rates, command, np.zeros(2))
+    assert np.abs(made - pressures(limit, command)).max() > 7e3
+    np.testing.assert_allclose(made, expected, atol=200.0)
+
+
+def test_a_shut_valve_ends_the_lagged_rate() -> None:
+    shut = np.concatenate([np.full(4, 4e5), np.full(30, -1.0)])
+    made = pressures({"regulator.rate_lag": 0.1}, shut)
+    np.testing.assert_allclose(made[4:], made[4], rtol=1e-12)
 
 
 def test_integral_part_overshoots_and_settles_on_the_setpoint() -> None:

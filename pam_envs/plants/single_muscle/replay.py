@@ -81,6 +81,7 @@ COSTLY = (
         "regulator.leak",
         "regulator.supply_pressure",
         "regulator.pilot_lag",
+        "regulator.rate_lag",
         "regulator.speed_2",
         "regulator.speed_6",
         "regulator.speed_20",
