@@ -31,7 +31,7 @@ from pam_envs.muscle.effects import (
     TemperatureEffects,
     ViscosityEffects,
 )
-from pam_envs.parameters import assumed, effect, identified, published
+from pam_envs.parameters import assumed, declarations, effect, identified, published
 
 MAP_SIZES = MAP._fields[: len(MAP_TERMS)]
 """Names of the sizes of a finer map."""
@@ -63,7 +63,7 @@ class EffectiveAreaMuscle(
         ("load_stiffening_2",),
         ("load_stiffening_root",),
         ("strand_1", "strand_2", "strand_3", "strand_4", "strand_break", "strand_per_pressure"),
-        ("yield_force", "yield_per_pressure", "yield_break", "yield_ratio", "yield_tail"),
+        tuple(declarations(LengthYieldTailEffects)),
         *ViscosityEffects.effects,
         MAP._fields,
     )

@@ -184,8 +184,10 @@ def strands_on(fixed: Any, force: int) -> int:
 class LengthYieldEffects:
     """Friction of the length that yields smoothly: one spring in parallel with the muscle.
 
-    Its stiffness is constant and its friction grows with the effective pressure, so that it creates
-    no energy whatever length and pressure do (:mod:`pam_envs.kernels.yielding`).
+    Its friction grows with the effective pressure. With ``yield_share = 0`` its stiffness is
+    constant, so that it creates no energy whatever length and pressure do
+    (:mod:`pam_envs.kernels.yielding`). With a share above 0 it is not passive: pressure raises the
+    force of an element that does not move.
     """
 
     yield_force: float = effect("N", 0.0, 5e4, "friction at full yield, at no pressure")
@@ -193,6 +195,14 @@ class LengthYieldEffects:
         0.0, "N/Pa", -0.1, 0.1, "friction gained with effective pressure", neutral=0.0
     )
     yield_break: float = assumed(0.01, "1", 0.001, 0.3, "strain over which it yields, likewise")
+    yield_share: float = assumed(
+        0.0,
+        "1",
+        0.0,
+        1.0,
+        "growth of the stiffness with pressure over that of the friction",
+        neutral=0.0,
+    )
     yield_ratio: float = assumed(
         0.5, "1", 0.0, 1.0, "0: springs back after a reversal, 1: friction of Dahl"
     )
@@ -207,15 +217,21 @@ class LengthYieldTailEffects(LengthYieldEffects):
     )
 
 
+LEAST_STIFFER = 1e-9
+"""Least stiffness over that without pressure: below it the friction is none, whatever its limit."""
+
+
 @kernel
 def yield_spring(fixed: Any, j: int, first: int, drive: float) -> tuple[float, float]:
     """Return the stiffness by strain [N], and the largest deflection at an effective pressure.
 
     ``first`` is the first row of :class:`LengthYieldEffects`.
     """
-    force = fixed[first][j]
+    force, span = fixed[first][j], fixed[first + 2][j]
     grown = max(0.0, force + fixed[first + 1][j] * drive) / force if force > 0.0 else 0.0
-    return force / fixed[first + 2][j], grown * fixed[first + 2][j]
+    stiffer = 1.0 + fixed[first + 3][j] * (grown - 1.0)
+    limit = grown / stiffer if stiffer > LEAST_STIFFER else 1.0
+    return stiffer * (force / span), limit * span
 
 
 @kernel
@@ -232,7 +248,7 @@ def yield_forces(
     for j in range(LANES):
         stiff, limit = yield_spring(fixed, j, first, drive[j])
         after, slope = deflected_with_tail(
-            deflection[j], moved[j], limit, fixed[first + 3][j], fixed[first + 4][j]
+            deflection[j], moved[j], limit, fixed[first + 4][j], fixed[first + 5][j]
         )
         friction[j] = friction[j] + stiff * after
         sticking[j] = sticking[j] + stiff * slope
@@ -247,7 +263,7 @@ def yield_deflections(
     for j in range(LANES):
         _, limit = yield_spring(fixed, j, first, drive[j])
         deflection[j], _ = deflected_with_tail(
-            deflection[j], moved[j], limit, fixed[first + 3][j], fixed[first + 4][j]
+            deflection[j], moved[j], limit, fixed[first + 4][j], fixed[first + 5][j]
         )
 
 

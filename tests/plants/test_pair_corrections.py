@@ -79,16 +79,15 @@ def test_friction_with_a_tail_is_that_of_dahl_or_bouc_and_wen():
     assert yielded_with_tail(0.0, 0.7, 1.0, -1.0)[0] == pytest.approx(np.tanh(0.7), rel=1e-9)
 
 
-@pytest.fixture(scope="module", params=["none", "maxwell_slip", "maxwell_slip_length"])
-def cycles(request):
+def recorded(kind, yielding):
     """Record two equal cycles of a joint with yielding friction and taut muscles.
 
     Return the plant, pressures [Pa] and contractions, both (2, T), and by muscle the friction [N]
     that is missing in its force: of a contraction, positive if it opposes growth.
     """
     smooth = {"muscle.viscosity": 0.0, "muscle.imbalance": 0.0}
-    plain = AntagonisticJoint.paper(request.param).with_lag_alone().replace(smooth)
-    plant = plain.replace(YIELDING)
+    plain = AntagonisticJoint.paper(kind).with_lag_alone().replace(smooth)
+    plant = plain.replace(yielding)
     corners = np.array([3.6, 5.5, 3.5, 4.5, 3.9, 5.3, 3.6]) * 1e5
     share = 0.5 - 0.5 * np.cos(np.pi * np.arange(120) / 120)
     cycle = (corners[:-1, None] + np.diff(corners)[:, None] * share).ravel()
@@ -103,6 +102,11 @@ def cycles(request):
     return plant, pressure, strain, friction
 
 
+@pytest.fixture(scope="module", params=["none", "maxwell_slip", "maxwell_slip_length"])
+def cycles(request):
+    return recorded(request.param, YIELDING)
+
+
 def friction_of_elements(plant, pressure, strain):
     """Return the friction [N] without its yielding part, (2, T)."""
     straight = float(plant.lever.contraction(0.0, plant.muscle.rest_length)[0])
@@ -115,15 +119,20 @@ def friction_of_elements(plant, pressure, strain):
     return made
 
 
-def test_yielding_friction_of_each_muscle_follows_its_contraction(cycles):
-    plant, pressure, strain, friction = cycles
+@pytest.mark.parametrize(
+    "kind, share",
+    [("none", 0.0), ("none", 1.0), ("maxwell_slip", 0.6), ("maxwell_slip_length", 0.0)],
+)
+def test_yielding_friction_of_each_muscle_follows_its_contraction(kind, share):
+    plant, pressure, strain, friction = recorded(kind, YIELDING | {"muscle.yield_share": share})
     straight = float(plant.lever.contraction(0.0, plant.muscle.rest_length)[0])
-    law = plant.muscle
-    stiff, expected = law.yield_force / law.yield_break, np.zeros(strain.shape)
+    law, expected = plant.muscle, np.zeros(strain.shape)
     for m in range(2):
         at, before = 0.0, straight
         for t, (p, e) in enumerate(zip(pressure[m], strain[m], strict=True)):
-            most = (law.yield_force + law.yield_per_pressure * p) / stiff
+            gained = law.yield_per_pressure * p
+            stiff = (law.yield_force + share * gained) / law.yield_break
+            most = (law.yield_force + gained) / stiff
             shape = most, law.yield_ratio, law.yield_tail
             at, before = deflected_with_tail(at, e - before, *shape)[0], e
             expected[m, t] = stiff * at

@@ -114,8 +114,9 @@ def yield_of(rows: Any, fixed: Any, j: int, m: int) -> tuple[float, float]:
 @kernel
 def yield_share(rows: Any, fixed: Any, j: int, m: int) -> float:
     """Return the stiffness of the yielding friction over that of the other friction."""
-    stiff, _ = yield_spring(fixed, j, PAIR.soft, 0.0)
-    return stiff / max(SOFTEST, friction_of(fixed, j, rows[PAIR.effective + m][j]))  # type: ignore[no-any-return]
+    drive = rows[PAIR.effective + m][j]
+    stiff, _ = yield_spring(fixed, j, PAIR.soft, drive)
+    return stiff / max(SOFTEST, friction_of(fixed, j, drive))  # type: ignore[no-any-return]
 
 
 @kernel
