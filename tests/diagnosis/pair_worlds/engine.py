@@ -116,11 +116,14 @@ def regulate(
 
 @njit(cache=True)
 def loop(kind: int, c: np.ndarray, z: float, du: float) -> float:
-    """Return the state of a muscle's friction, from -1 to 1, after a change of contraction."""
+    """Return the state of a muscle's friction, from -1 to 1, after a change of contraction.
+
+    Neither loop creates energy: that of Bouc and Wen would, if it softened on the way back.
+    """
     s = du / c[6]
     if kind == 0:
         side = 1.0 if du * z > 0.0 else -1.0
-        z += s * (1.0 - abs(z) ** 1.4 * (0.6 + 0.4 * side))
+        z += s * (1.0 - abs(z) ** 1.4 * (0.4 + 0.6 * side))
     else:
         side = 1.0 if du > 0.0 else -1.0
         z += 0.7 * s * max(1.0 - side * z, 0.0) ** 1.5
