@@ -48,14 +48,16 @@ def with_correction(
 def with_yielding(causes: Sequence[Cause], component: str = "muscle") -> tuple[Cause, ...]:
     """Return causes whose shape of the loops is friction of the length that yields smoothly.
 
-    For plants whose friction is driven by length anyway; ``component`` is that with the friction.
+    For plants whose friction is driven by length anyway; ``component`` is that with the friction,
+    whose stiffness may also grow with the pressure.
     """
     shape, drive = by_name("hysteresis_shape"), by_name("hysteresis_drive")
     form = next(form for form in drive.forms if form.name == "yielding")
     terms = [
         replace(term, name=f"{component}.{term.name.partition('.')[2]}") for term in form.terms
     ]
-    made = replace(shape, forms=(replace(form, terms=tuple(terms)),))
+    share = Term(f"{component}.yield_share", (0.0,), scale=0.3, amount=False, prior=2.0)
+    made = replace(shape, forms=(replace(form, terms=(*terms, share)),))
     kept = (cause for cause in causes if cause.name != drive.name)
     return tuple(made if cause.name == shape.name else cause for cause in kept)
 

@@ -24,8 +24,14 @@ from pam_envs.diagnosis.fit.least_squares import (
     column_of,
     no_violations,
 )
-from pam_envs.diagnosis.fit.regulator_kind import simplest, start_at_guess
-from pam_envs.diagnosis.fit.single_muscle import CLOCK, PILOT, SETTINGS, clock_free, identified
+from pam_envs.diagnosis.fit.regulator_kind import STAGES, second_orders, simplest, start_at_guess
+from pam_envs.diagnosis.fit.single_muscle import (
+    CLOCK,
+    SECOND_ORDER,
+    SETTINGS,
+    clock_free,
+    identified,
+)
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.parameters import Declaration
 from pam_envs.plants.core.plant import Plant
@@ -40,9 +46,8 @@ WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hys
 ROUNDS, VALVE_ROUNDS = 25, 12
 INSTANT = {"dead_time": 0.0, "slew_rate": 1e9, "gain": 1.0}
 """Parameters of a regulator whose pressures are the measured ones."""
-PILOT_LAG = "regulator.pilot_lag"
-PILOTS = {name: SETTINGS[name] for name in PILOT}
-"""Settings of the fit of a regulator's pilot stage."""
+STAGE_SETTINGS = {name: SETTINGS[name] for name in STAGES}
+"""Settings of the fit of a regulator of second order."""
 LEAST_LAG = 2e-3
 """Least time constant of a regulator [s]."""
 
@@ -223,14 +228,15 @@ class CompiledFamily(UsualStart):
         made: dict[str, Any] = {"low": d.low, "high": d.high, "start": value}
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
         place = self.plant.names.index(name)
-        settings = {**PILOTS.get(name, {}), **self.settings.get(name, {})}
+        settings = {**STAGE_SETTINGS.get(name, {}), **self.settings.get(name, {})}
         return Free(name, place, **{**made, **settings, **changes})
 
     def base(self) -> tuple[Free, ...]:
         """Return the base parameters, with those of effects that the plant already has."""
         names = [n for n in self.settings if not (self.measured_drive and in_valve(n))]
-        if not self.measured_drive and self.plant.value(PILOT_LAG) != 0.0:
-            names += list(PILOT)
+        if not self.measured_drive:
+            for order in SECOND_ORDER:
+                names += order if self.plant.value(next(iter(order))) > 0.0 else ()
         names += [CLOCK] if self.lead else []
         names += [f"{WEIGHT}{k}]" for k in range(self.elements)]
         present = [
@@ -323,7 +329,7 @@ def regulator_of(
 ) -> tuple[Any, Mapping[str, float], Array]:
     """Return the plant with the regulator that the pressures need, its values, and the column.
 
-    Of first order, or with a pilot stage if it is better on held-out pressures.
+    Of first order, or of second order if it is better on held-out pressures.
     """
     valve = tuple(f for f in family.base() if in_valve(f.name))
     pressures = np.array([c.startswith("pressure") for c in family.channels])
@@ -332,13 +338,13 @@ def regulator_of(
         return family, {}, family.column
     only = dataclasses.replace(problem, measured=alone, violations=no_violations, checks=0)
     orders = [valve]
-    if not {f.name for f in valve} & set(PILOT) and family.plant.air == "regulator":
-        orders.append((*valve, *(family.free(name, start=start) for name, start in PILOT.items())))
+    if family.plant.air == "regulator":
+        orders += second_orders(family, valve)
     fits = [Fit.at_start(frees, family.column) for frees in orders]
     chosen = simplest(only, blocks, fits, VALVE_ROUNDS)
     found = chosen.values()
-    pilot = {name: found[name] for name in PILOT if name in found}
-    family = dataclasses.replace(family, plant=family.plant.replace(pilot))
+    stages = {name: found[name] for name in STAGES if name in found}
+    family = dataclasses.replace(family, plant=family.plant.replace(stages))
     return family, found, column_of(chosen, chosen.z)
 
 

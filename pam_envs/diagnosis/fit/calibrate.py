@@ -20,13 +20,13 @@ from pam_envs.diagnosis.fit.least_squares import (
 )
 from pam_envs.diagnosis.fit.regulator_kind import (
     FINE_STEP,
+    STAGES,
     Selection,
     column_with,
     start_at_guess,
 )
 from pam_envs.diagnosis.fit.single_muscle import (
     LAG,
-    PILOT,
     START,
     MuscleFamily,
     spanning,
@@ -108,7 +108,7 @@ def calibrate(
         family, fit, shown = selection.selected()
         found |= fit.values()
         if family.plant.air == "regulator" and found[LAG] < FAST:
-            family = family.finer(FINEST_STEP if set(PILOT) <= set(found) else FINE_STEP)
+            family = family.finer(FINEST_STEP if STAGES & set(found) else FINE_STEP)
         problem = replayed_by(family, problem)
         column = column_of(fit, fit.z)
     frees = family.base()

@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
     CLOCK,
     INTEGRAL,
     ORIFICES,
-    PILOT,
+    SECOND_ORDER,
     SPEEDS,
     MuscleFamily,
 )
@@ -69,6 +70,9 @@ INTEGRALS, RELEASES = (10.0, 40.0), (0.1, 0.5)
 """Gain [1/s2] and release time [s] of an integral part at which a fit starts."""
 CHARACTERISTICS = ((0.95, 0.9, 0.8, 0.6), (0.7, 0.5, 0.3, 0.15), (1.3, 1.6, 1.8, 1.9))
 """Values of :data:`SPEEDS` at which a fit starts."""
+
+STAGES = frozenset(name for order in SECOND_ORDER for name in order)
+"""Parameters of regulators of second order."""
 
 Made = tuple[MuscleFamily, Fit]
 """A family with a kind of regulator, and its fit; a kind that cannot be tried gives None."""
@@ -124,14 +128,14 @@ class Selection:
         lag = (*regulator_of(family), *self.aside(family))
         known = {f.name for f in lag}
         flows = family.plant.air == "flow"
-        orders = [lag] if flows or known & set(PILOT) else [lag, (*lag, *pilot_of(family))]
+        orders = [lag] if flows else [lag, *second_orders(family, lag)]
         limits: list[tuple[Free, ...]] = [()]
         for form in self.limit.forms:
             if not flows and not any(t.name in known for t in form.terms):
                 limits += [frees_for(family, form, values) for values in form.starts]
         fits = [Fit.at_start((*o, *limit), family.column) for o in orders for limit in limits]
         chosen = self.simplest(fits, LONG_ROUNDS)
-        return with_values(family, chosen, PILOT), chosen
+        return with_values(family, chosen, STAGES), chosen
 
     def aside(self, family: MuscleFamily) -> tuple[Free, ...]:
         """Return effects that are free while a kind is selected, unless the base holds them.
@@ -270,12 +274,10 @@ class Selection:
         for speeds in CHARACTERISTICS:
             begin = fit.values() | dict(zip(SPEEDS, speeds, strict=True))
             frees = start_at_guess((*regulator_of(other), *self.aside(other)), begin)
-            known = {f.name for f in frees}
-            fits.append(Fit.at_start(frees, other.column))
-            if not known & set(PILOT):
-                fits.append(Fit.at_start((*frees, *pilot_of(other)), other.column))
+            orders = [frees, *second_orders(other, frees)]
+            fits += [Fit.at_start(order, other.column) for order in orders]
         made = self.of(other).simplest(fits, LONG_ROUNDS)
-        return with_values(other, made, (*SPEEDS, *PILOT)), made
+        return with_values(other, made, (*SPEEDS, *STAGES)), made
 
     def integral(self, family: MuscleFamily, fit: Fit) -> Made | None:
         """Return the lag with a controller that also has an integral part."""
@@ -355,9 +357,14 @@ def regulator_of(family: MuscleFamily) -> tuple[Free, ...]:
     return tuple(f for f in every if f.name.startswith("regulator.") or f.name in (BORE, CLOCK))
 
 
-def pilot_of(family: MuscleFamily) -> tuple[Free, ...]:
-    """Return the free parameters of the pilot stage of a second-order lag."""
-    return tuple(family.free(name, start=start) for name, start in PILOT.items())
+def second_orders(family: Any, frees: tuple[Free, ...]) -> list[tuple[Free, ...]]:
+    """Return the free parameters of a lag with those of each second order; none if it has one."""
+    if {f.name for f in frees} & STAGES:
+        return []
+    return [
+        (*frees, *(family.free(name, start=start) for name, start in order.items()))
+        for order in reversed(SECOND_ORDER)
+    ]
 
 
 def with_values(family: MuscleFamily, fit: Fit, names: Collection[str]) -> MuscleFamily:
@@ -399,15 +406,16 @@ def can_flow(family: MuscleFamily) -> bool:
         and all(
             plant.value(f"regulator.{name}") == plant.neutral[f"regulator.{name}"]
             for name in REPLACED
-            if name != "pilot_lag" and f"regulator.{name}" in plant.neutral
+            if f"regulator.{name}" in plant.neutral and f"regulator.{name}" not in STAGES
         )
     )
 
 
 def orifices_of(plant: SingleMuscle) -> SingleMuscle:
-    """Return a plant with flow through orifices at their starting values, without a pilot."""
+    """Return a plant with flow through orifices at their starting values, of first order."""
     source = max(ORIFICES["regulator.source_pressure"], 1.2 * plant.regulator.max_pressure)
-    values = {**ORIFICES, "regulator.source_pressure": source, "regulator.pilot_lag": 0.0}
+    first_order = {name: plant.neutral[name] for name in STAGES & set(plant.neutral)}
+    values = {**ORIFICES, "regulator.source_pressure": source, **first_order}
     return plant.replace_with_substeps({**values, SWITCH: float(AIRS.index("flow"))})
 
 

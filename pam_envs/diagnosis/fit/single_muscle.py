@@ -67,6 +67,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.source_pressure": {"log": True, "prior": 0.5},
     "regulator.pilot_lag": {"log": True, "low": 2e-3, "prior": 2.0},
     "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
+    "regulator.rate_lag": {"log": True, "low": 2e-3, "prior": 2.0},
     "regulator.integral": {"high": 300.0, "scale": 10.0, "prior": 10.0},
     "regulator.integral_release": {"log": True, "prior": 2.0},
     **{name: {"log": True, "low": 0.03, "high": 10.0, "prior": 1.5} for name in SPEEDS},
@@ -100,8 +101,13 @@ SOURCE, LEAST_SOURCE = "regulator.source_pressure", 1.001
 LAG = "regulator.time_constant"
 PILOT = {"regulator.pilot_lag": 0.02, "regulator.pilot_damping": 1.0}
 """Starting values of the pilot stage of a regulator of second order."""
+SPOOL = {"regulator.rate_lag": 0.02}
+"""Starting value of the lag of the rate, of a regulator of second order whose rate is limited."""
+SECOND_ORDER = (PILOT, SPOOL)
 BASE = tuple(
-    name for name in SETTINGS if name not in {*PILOT, *INTEGRAL, *ORIFICES, *SPEEDS, BORE, START}
+    name
+    for name in SETTINGS
+    if name not in {*PILOT, *SPOOL, *INTEGRAL, *ORIFICES, *SPEEDS, BORE, START}
 )
 CLOCK = "clock.offset"
 """Time [s] by which the readings lag the command: no parameter of the plant."""
@@ -249,7 +255,8 @@ class MuscleFamily:
         flows = self.plant.air == "flow"
         names = [name for name in BASE if not (flows and name == LAG)]
         names += [*((*ORIFICES, BORE) if flows else ()), *((CLOCK,) if self.clock > 0.0 else ())]
-        names += [name for name in PILOT if self.plant.regulator.pilot_lag > 0.0]
+        for order in SECOND_ORDER:
+            names += order if self.plant.value(next(iter(order))) > 0.0 else ()
         names += [name for name in INTEGRAL if self.plant.regulator.integral > 0.0]
         names += [f"hysteresis.weight[{k}]" for k in range(self.plant.elements)]
         present = [
