@@ -488,7 +488,10 @@ def regulate_with_effects(
     lag = lag / within if abs(goal - pressure) < over else lag
     aim = goal + shift if goal < pressure else goal - shift
     gathered, gain = rows[state + AIR_STATE.integral][j], fixed[effects + AIR.integral][j]
-    aim = aim + (lag * gathered if wide == 0.0 or opened > 0.0 else 0.0)
+    if gain > 0.0:  # the exhaust slows the whole rate, with the integral part
+        lag = lag / lag_towards(fixed, j, effects, 1.0, pressure, goal, full)
+        aim = aim + (lag * gathered if wide == 0.0 or opened > 0.0 else 0.0)
+        lag = lag_towards(fixed, j, effects, lag, pressure, aim, full)
     slew = slew * (fixed[effects + AIR.slew_ratio][j] if aim < pressure else 1.0)
     reached = regulator_step(pressure, aim, lag, 1.0 / lag, slew, 1.0 / slew, h)
     free = (aim - pressure) * (1.0 - decay(h / lag))

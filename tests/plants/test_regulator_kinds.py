@@ -74,17 +74,20 @@ def test_a_shut_valve_ends_the_lagged_rate() -> None:
     np.testing.assert_allclose(made[4:], made[4], rtol=1e-12)
 
 
-def test_integral_part_overshoots_and_settles_on_the_setpoint() -> None:
+@pytest.mark.parametrize("slower", [1.0, 1.6])
+def test_integral_part_overshoots_and_settles_on_the_setpoint(slower: float) -> None:
     command, gain, release = steps(4e5, 1e5, 1.1e5, 5.5e5), 50.0, 2.0
 
     def rates(_: float, state: Any, target: float) -> Any:
         error = target - state[0]
         wanted = error / LAG + state[1]
+        wanted = wanted if wanted > 0.0 else wanted / slower
         rate = np.clip(wanted, -RATE, RATE)
         return [rate, gain * error + (rate - wanted) / release]
 
     changes = {"regulator.integral": gain, "regulator.integral_release": release}
-    made = pressures(changes | {"regulator.slew_rate": RATE}, command)
+    changes |= {"regulator.exhaust_ratio": slower, "regulator.slew_rate": RATE}
+    made = pressures(changes, command)
     expected = solved(rates, command, np.zeros(2))
     second = len(command) // 4
     assert made[:second].max() > 4.05e5 and made[second : 2 * second].min() < 0.95e5

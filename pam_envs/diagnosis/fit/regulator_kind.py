@@ -158,8 +158,10 @@ class Selection:
         known, fits = {f.name for f in fit.frees}, []
         for cause in (c for c in self.causes if c.name not in but):
             for form in filter(self.acts, cause.forms):
-                for values in form.starts if not any(t.name in known for t in form.terms) else ():
-                    frees = frees_for(self.family, form, values)
+                for values in form.starts:
+                    frees = [f for f in frees_for(self.family, form, values) if f.name not in known]
+                    if not frees:
+                        break
                     z = np.concatenate([fit.z, [f.inner(f.start) for f in frees]])
                     more = restarted(fit, frees=(*fit.frees, *frees), z=z, shared=None)
                     fits.append((cause.name, form, more))
