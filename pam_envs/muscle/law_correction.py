@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebval2d
+from numpy.polynomial.chebyshev import chebder, chebval2d
 from numpy.typing import ArrayLike
 
 from pam_envs.arrays import Array
@@ -60,14 +60,29 @@ class LawCorrection(StaticMapEffects):
 
     def correction(self, pressure: ArrayLike, strain: ArrayLike) -> Array:
         """Return the force [N] of the correction at a pressure [Pa] and a strain [1]."""
+        u, s = self._coordinates(pressure, strain)
+        return np.asarray(chebval2d(u, s, self._sizes()))
+
+    def correction_growth(self, pressure: ArrayLike, strain: ArrayLike) -> Array:
+        """Return the derivative of :meth:`correction` by strain [N]."""
+        u, s = self._coordinates(pressure, strain)
+        inside = 2.0 / self.map_strain * (np.abs(s) < 1.0)
+        return np.asarray(chebval2d(u, s, chebder(self._sizes(), axis=1)) * inside)
+
+    def _sizes(self) -> Array:
+        """Return the sizes [N] by order in pressure and strain, (6, 6)."""
         sizes = np.zeros((6, 6))
         for (p, e), name in zip(TERMS, NAMES, strict=True):
             sizes[p, e] = getattr(self, name)
+        return sizes
+
+    def _coordinates(self, pressure: ArrayLike, strain: ArrayLike) -> tuple[Array, Array]:
+        """Return the coordinates from -1 to 1 in the range of the map."""
         u = np.clip(2.0 * np.asarray(pressure, float) / self.map_pressure - 1.0, -1.0, 1.0)
         beyond = np.asarray(strain, float) - self.map_least
         s = np.clip(2.0 * beyond / self.map_strain - 1.0, -1.0, 1.0)
         u, s = np.broadcast_arrays(u, s)
-        return np.asarray(chebval2d(u, s, sizes))
+        return u, s
 
 
 FIELDS = tuple(declarations(LawCorrection))

@@ -86,3 +86,21 @@ def test_force_of_a_bundle_lacks_that_of_the_viscosity_of_its_muscles(kind):
         lost = bundle.muscles * 2e-3 * made[f"pressure_{side}"] * share * sign * speed
         assert np.ptp(lost) > 10.0
         assert force - made[f"force_{side}"] == pytest.approx(lost, abs=1e-6)
+
+
+def test_stiffness_is_the_derivative_of_the_corrected_torque():
+    terms = {
+        "muscle.map_02": 3.0,
+        "muscle.map_12": -2.0,
+        "muscle.map_30": 4.0,
+        "muscle.map_13": 1.5,
+    }
+    ends = {"muscle.map_pressure": 5e5, "muscle.map_strain": 0.3, "muscle.map_least": -0.02}
+    plain = ElbowOrthosis.paper("none")
+    plant, pressures = plain.replace(terms | ends), (2.2e5, 3.1e5)
+    angles = np.linspace(0.3, 1.8, 16)
+    found = plant.stiffness(angles, *pressures)
+    assert np.abs(found - plain.stiffness(angles, *pressures)).max() > 0.1
+    step = 1e-5
+    below, above = (plant.torque(angles + d, *pressures) for d in (-step, step))
+    np.testing.assert_allclose(found, (below - above) / (2.0 * step), rtol=1e-4, atol=1e-3)

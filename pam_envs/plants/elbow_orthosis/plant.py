@@ -243,11 +243,24 @@ class ElbowOrthosis(Plant, rows=K):
         return self.pulley.torque(*self.forces(angle, pressure_a, pressure_b))
 
     def stiffness(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
-        """Return the stiffness ``S = -K_q`` [N m/rad] at held pressures [Pa], Eq. (22)."""
+        """Return the stiffness ``S = -K_q`` [N m/rad] at held pressures [Pa], Eq. (22).
+
+        With that of the law's correction.
+        """
         c_a, c_b = self.pulley.contractions(angle)
-        k_a = self.bundle_a.stiffness(pressure_a, c_a) * (self.bundle_a.shape(c_a) > 0.0)
-        k_b = self.bundle_b.stiffness(pressure_b, c_b) * (self.bundle_b.shape(c_b) > 0.0)
-        return np.asarray(-(self.pulley.radius**2) * (k_a + k_b))
+        k_a = self._growth(self.bundle_a, pressure_a, c_a)
+        return np.asarray(
+            -(self.pulley.radius**2) * (k_a + self._growth(self.bundle_b, pressure_b, c_b))
+        )
+
+    def _growth(self, bundle: QuadraticBundle, pressure: ArrayLike, contraction: Array) -> Array:
+        """Return the derivative [N/m] of a bundle's force by its contraction."""
+        slope = bundle.stiffness(pressure, contraction) * (bundle.shape(contraction) > 0.0)
+        if self.muscle.corrects:
+            more = self.muscle.correction_growth(pressure, contraction / bundle.nominal_length)
+            taut = self._force(bundle, pressure, contraction) > 0.0
+            slope = slope + bundle.gain * bundle.muscles / bundle.nominal_length * more * taut
+        return np.asarray(slope)
 
     def determinant(self, angle: ArrayLike) -> Array:
         """Return the determinant [m6] of the map from both factors to torque and ``K_q``."""
