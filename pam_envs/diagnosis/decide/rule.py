@@ -14,12 +14,12 @@ import numpy as np
 class Rule:
     """Thresholds of the decision."""
 
-    version: str = "13"  # part of every report
+    version: str = "14"  # part of every report
     least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
     least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
     # the same on a rig whose law or friction differs from the base, of any cause and of one that is
     # like another law: a smaller gain may correct what is left of that difference
-    differing_gain: float = 0.2
+    differing_gain: float = 0.35
     differing_lawlike: float = 0.6
     trial_penalty: float = (
         0.01  # multiple-comparison penalty: gain lost for each factor e of trials
