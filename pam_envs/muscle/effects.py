@@ -218,7 +218,7 @@ class LengthYieldTailEffects(LengthYieldEffects):
 
 
 LEAST_STIFFER = 1e-9
-"""Least stiffness over that without pressure: below it the friction is none, whatever its limit."""
+"""Stiffness over that without pressure, below which the element counts as without friction."""
 
 
 @kernel

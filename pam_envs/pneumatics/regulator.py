@@ -356,7 +356,7 @@ def lag_towards(
 ) -> float:
     """Return the lag [s] towards a goal: exhaust is slower than filling."""
     slower = (fixed[effects + AIR.exhaust_ratio][j] - 1.0) * (
-        1.0 - fixed[effects + AIR.exhaust_taper][j] * pressure / full
+        1.0 - fixed[effects + AIR.exhaust_taper][j] * min(full, pressure) / full
     )
     return lag * (1.0 + slower if goal < pressure else 1.0)
 
@@ -401,7 +401,7 @@ def leaked(
 
 
 SHORTEST = 0.25
-"""Shortest lag of second order that a step follows, over the step."""
+"""Shortest lag of second order that an interval of integration follows, over the interval."""
 
 
 @kernel
@@ -437,13 +437,13 @@ PARTS = 4
 
 @kernel
 def lagged_step(
-    rows: Any, fixed: Any, j: int, state: int, effects: int, aim: float, lag: float, slew: float,
-    h: float,
+    rows: Any, fixed: Any, j: int, state: int, effects: int, aim: float, lag: float, low: float,
+    high: float, h: float,
 ) -> float:  # fmt: skip
     """Return the pressure [Pa] of lane ``j`` after ``h`` seconds with a lag of its rate.
 
-    The rate follows ``(aim - pressure) / lag`` with the time constant ``rate_lag``, within
-    ``slew``.
+    The rate follows ``(aim - pressure) / lag`` with the time constant ``rate_lag``, between ``low``
+    and ``high`` [Pa/s].
     """
     pressure, rate = rows[state + AIR_STATE.regulated][j], rows[state + AIR_STATE.rate][j]
     part = h / PARTS
@@ -451,8 +451,8 @@ def lagged_step(
     k, damped = damping / max(lag, SHORTEST * part), decay(0.5 * damping * part)
     for _ in range(PARTS):
         moved, rate = damped_motion(rate, k * (aim - pressure), 0.0, k, damping, damped, part)
-        pressure = pressure + max(-slew * part, min(slew * part, moved))
-        rate = max(-slew, min(slew, rate))
+        pressure = pressure + max(low * part, min(high * part, moved))
+        rate = max(low, min(high, rate))
     rows[state + AIR_STATE.rate][j] = rate
     return pressure
 
@@ -492,15 +492,18 @@ def regulate_with_effects(
         lag = lag / lag_towards(fixed, j, effects, 1.0, pressure, goal, full)
         aim = aim + (lag * gathered if wide == 0.0 or opened > 0.0 else 0.0)
         lag = lag_towards(fixed, j, effects, lag, pressure, aim, full)
-    slew = slew * (fixed[effects + AIR.slew_ratio][j] if aim < pressure else 1.0)
+    low, high = -slew * fixed[effects + AIR.slew_ratio][j], slew
+    slew = -low if aim < pressure else high
     reached = regulator_step(pressure, aim, lag, 1.0 / lag, slew, 1.0 / slew, h)
     free = (aim - pressure) * (1.0 - decay(h / lag))
     late = fixed[effects + AIR.rate_lag][j] > 0.0 and h > 0.0
     if late:
-        rate = rows[state + AIR_STATE.rate][j]
-        free = lagged_step(rows, fixed, j, state, effects, aim, lag, NO_SLEW_LIMIT, h) - pressure
+        most, rate = NO_SLEW_LIMIT, rows[state + AIR_STATE.rate][j]
+        free = lagged_step(rows, fixed, j, state, effects, aim, lag, -most, most, h) - pressure
         rows[state + AIR_STATE.rate][j] = rate
-        reached = lagged_step(rows, fixed, j, state, effects, aim, lag, slew, h)
+        reached = lagged_step(rows, fixed, j, state, effects, aim, lag, low, high, h)
+        if wide > 0.0 and opened == 0.0:  # closed: the air stays
+            free, reached = 0.0, pressure
     moved, most = reached, slew * max(h, 1e-9)
     rounded = pressure + free * most / math.sqrt(free * free + most * most)
     bend = fixed[effects + AIR.slew_bend][j] if slew < NO_SLEW_LIMIT else 0.0
@@ -519,8 +522,10 @@ def regulate_with_effects(
     rows[state + AIR_STATE.opened][j] = stays if h > 0.0 else before
     reached = stopped
     reached = pressure if target < 0.0 else reached
-    if late and reached != moved:  # other limits hold the rate too, and a shut valve ends it
-        rows[state + AIR_STATE.rate][j] = (reached - pressure) / h
+    if late:  # what else limits the motion slows it; a closed valve ends it
+        rate = rows[state + AIR_STATE.rate][j] + (reached - moved) / h
+        closed = target < 0.0 or (wide > 0.0 and stays == 0.0)
+        rows[state + AIR_STATE.rate][j] = 0.0 if closed else max(low, min(high, rate))
     # anti-windup: limits of the rate drain the integral
     missed = (reached - pressure - free) / max(h, fixed[effects + AIR.integral_release][j])
     summed = gathered + h * gain * (goal - 0.5 * (pressure + reached)) + missed

@@ -52,20 +52,51 @@ def test_rate_follows_the_characteristic() -> None:
     np.testing.assert_allclose(made, expected, atol=1.5e3)
 
 
+@pytest.mark.parametrize("slower", [1.0, 0.4])
 @pytest.mark.parametrize("late", [0.02, 0.1])
-def test_rate_lags_within_its_limit(late: float) -> None:
+def test_rate_lags_within_its_limits(late: float, slower: float) -> None:
     command, most = steps(4e5, 1e5, 1.1e5, 5.5e5), 1e6
 
     def rates(_: float, state: Any, target: float) -> Any:
-        p, rate = state[0], np.clip(state[1], -most, most)
+        p, rate = state[0], np.clip(state[1], -slower * most, most)
         more = ((target - p) / LAG - rate) / late
-        return [rate, 0.0 if abs(state[1]) >= most and more * state[1] > 0.0 else more]
+        held = state[1] != rate and more * rate > 0.0
+        return [rate, 0.0 if held else more]
 
-    limit = {"regulator.slew_rate": most}
+    limit = {"regulator.slew_rate": most, "regulator.slew_ratio": slower}
     made = pressures(limit | {"regulator.rate_lag": late}, command)
     expected = solved(rates, command, np.zeros(2))
     assert np.abs(made - pressures(limit, command)).max() > 7e3
-    np.testing.assert_allclose(made, expected, atol=200.0)
+    np.testing.assert_allclose(made, expected, atol=300.0)
+
+
+@pytest.mark.parametrize("band", [5e3, 2e4])
+def test_a_valve_that_closes_ends_the_lagged_rate(band: float) -> None:
+    made = pressures(
+        {"regulator.rate_lag": 0.05, "regulator.dead_band": band}, steps(4e5, 1e5, 4e5)
+    )
+    second = len(made) // 3
+    for k, (side, target) in enumerate(((-1.0, 4e5), (1.0, 1e5), (-1.0, 4e5))):
+        rest = made[(k + 1) * second - 20 : (k + 1) * second]
+        np.testing.assert_allclose(rest, target + side * band, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "hardly", [{"slew_bend": 1e-9}, {"supply_pressure": 1.9e7}, {"exhaust_rate": 99.0}]
+)
+def test_further_limits_change_the_lagged_rate_gradually(hardly: dict[str, float]) -> None:
+    command = steps(4e5, 1e5)
+    late = {"regulator.rate_lag": 0.05, "regulator.slew_rate": 2e6}
+    more = {f"regulator.{name}": value for name, value in hardly.items()}
+    np.testing.assert_allclose(pressures(late | more, command), pressures(late, command), atol=20.0)
+
+
+@pytest.mark.parametrize("slow", [{"integral": 50.0}, {"rate_lag": 0.2}])
+def test_tapered_exhaust_above_full_pressure_stays_an_exhaust(slow: dict[str, float]) -> None:
+    changes = {"exhaust_ratio": 20.0, "exhaust_taper": 1.0} | slow
+    made = pressures({f"regulator.{n}": v for n, v in changes.items()}, steps(FULL, FULL))
+    assert made.max() > 1.02 * FULL  # it overshoots
+    assert np.abs(np.diff(made)).max() < 1.3e5
 
 
 def test_a_shut_valve_ends_the_lagged_rate() -> None:

@@ -150,14 +150,21 @@ class Selection:
         known = {free.name for free in family.base()}
         return tuple(family.free(n, **given) for n, given in starts.items() if n not in known)
 
-    def with_effects(self, fit: Fit, but: Collection[str] = ()) -> dict[str, tuple[Form, Fit]]:
+    def with_effects(
+        self, fit: Fit, shown: Mapping[str, Form] | None = None
+    ) -> dict[str, tuple[Form, Fit]]:
         """Return, for each cause that a fit lacks, its best form and the fit with it.
 
-        ``but`` are names of causes that are left out.
+        Causes in ``shown`` and forms that share a parameter with those are left out. Of a form with
+        parameters that are free already, the others are added.
         """
+        shown = shown or {}
+        taken = {t.name for form in shown.values() for t in form.terms}
         known, fits = {f.name for f in fit.frees}, []
-        for cause in (c for c in self.causes if c.name not in but):
+        for cause in (c for c in self.causes if c.name not in shown):
             for form in filter(self.acts, cause.forms):
+                if taken & {t.name for t in form.terms}:
+                    continue
                 for values in form.starts:
                     frees = [f for f in frees_for(self.family, form, values) if f.name not in known]
                     if not frees:
@@ -360,7 +367,10 @@ def regulator_of(family: MuscleFamily) -> tuple[Free, ...]:
 
 
 def second_orders(family: Any, frees: tuple[Free, ...]) -> list[tuple[Free, ...]]:
-    """Return the free parameters of a lag with those of each second order; none if it has one."""
+    """Return the free parameters of a lag with those of each second order.
+
+    An empty list if the lag already is of second order.
+    """
     if {f.name for f in frees} & STAGES:
         return []
     return [

@@ -258,8 +258,8 @@ class ElbowOrthosis(Plant, rows=K):
         slope = bundle.stiffness(pressure, contraction) * (bundle.shape(contraction) > 0.0)
         if self.muscle.corrects:
             more = self.muscle.correction_growth(pressure, contraction / bundle.nominal_length)
-            taut = self._force(bundle, pressure, contraction) > 0.0
-            slope = slope + bundle.gain * bundle.muscles / bundle.nominal_length * more * taut
+            slope = slope + bundle.gain * bundle.muscles / bundle.nominal_length * more
+            slope = slope * (self._force(bundle, pressure, contraction) > 0.0)
         return np.asarray(slope)
 
     def determinant(self, angle: ArrayLike) -> Array:

@@ -118,7 +118,7 @@ def regulate(
 def loop(kind: int, c: np.ndarray, z: float, du: float) -> float:
     """Return the state of a muscle's friction, from -1 to 1, after a change of contraction.
 
-    Neither loop creates energy: that of Bouc and Wen would, if it softened on the way back.
+    At constant pressure neither loop creates energy: that of Bouc and Wen stiffens on the way back.
     """
     s = du / c[6]
     if kind == 0:
