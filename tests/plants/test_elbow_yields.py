@@ -19,14 +19,19 @@ SETTLED = 100
 """Control periods until the friction has forgotten its start."""
 
 
-@pytest.fixture(scope="module", params=["maxwell_slip_length", "maxwell_slip"])
+@pytest.fixture(
+    scope="module",
+    params=[("maxwell_slip_length", 0.0), ("maxwell_slip_length", 0.6), ("maxwell_slip", 0.6)],
+)
 def motion(request):
     """Record an elbow whose bundles stay taut.
 
     Return the plant, and of bundles a and b pressures [Pa], contractions [m] and the friction [N]
     that is missing in their forces, each (2, T).
     """
-    plant = ElbowOrthosis.paper(request.param).with_lag_alone().replace(YIELDING)
+    kind, share = request.param
+    yielding = YIELDING | {"hysteresis.yield_share": share}
+    plant = ElbowOrthosis.paper(kind).with_lag_alone().replace(yielding)
     phase = 2.0 * np.pi * np.arange(400) / 200
     swing = 0.6e5 * np.sin(phase) + 0.3e5 * np.sin(3.0 * phase)
     commands = np.stack([2e5 - swing, 1.2e5 + swing], axis=1)
@@ -43,15 +48,17 @@ def motion(request):
 
 def test_friction_is_that_of_the_muscles_and_follows_their_contraction(motion):
     plant, pressure, contraction, friction = motion
-    own, drive = plant.hysteresis, plant.hysteresis.drive
+    own = plant.hysteresis
+    share = own.yield_share if own.drive == "length" else 1.0
     for m, bundle in enumerate((plant.bundle_a, plant.bundle_b)):
         strain, z = contraction[m] / bundle.nominal_length, 0.0
         before, expected = strain[0], np.zeros(len(strain))
         for t, (p, e) in enumerate(zip(pressure[m], strain, strict=True)):
             grown = 1.0 + own.yield_per_pressure * p / own.yield_force
-            reach = own.yield_break * (grown if drive == "length" else 1.0)
+            stiffer = 1.0 + share * (grown - 1.0)
+            reach = own.yield_break * grown / stiffer
             z = deflected_with_tail(z, e - before, reach, own.yield_ratio, own.yield_tail)[0]
-            stiff = own.yield_force / own.yield_break * (1.0 if drive == "length" else grown)
+            stiff = own.yield_force / own.yield_break * stiffer
             before, expected[t] = e, bundle.muscles * stiff * z
         largest = np.abs(expected[SETTLED:]).max()
         assert largest > 0.8 * bundle.muscles * own.yield_force

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pam_envs.kernels.yielding import deflected_with_tail, yielded_with_tail
-from pam_envs.muscle.effects import yield_spring
+from pam_envs.muscle.effects import LengthYieldTailEffects, yield_spring
+from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import Inputs, alike, replay, replay_rows
@@ -79,6 +80,18 @@ def test_yielding_in_length_acts_against_the_motion_and_grows_with_pressure() ->
     lag = width({}, 3e5)
     assert width(constant, 3e5) - lag > 1e-4
     assert width(BY_LENGTH, 3e5) - lag > 1.3 * (width(constant, 3e5) - lag)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_share_divides_the_growth_between_stiffness_and_slip(share: float) -> None:
+    """Force at full yield, and force of a small motion, at two pressures."""
+    law = SingleMuscle.mas10("none").replace(BY_LENGTH | {"muscle.yield_share": share}).muscle
+    fixed = np.array([[getattr(law, name)] for name in declarations(LengthYieldTailEffects)])
+    for pressure in (0.0, 3e5):
+        stiff, limit = yield_spring(fixed, 0, 0, pressure)
+        assert stiff * limit == pytest.approx(law.yield_force + law.yield_per_pressure * pressure)
+        gained = share * law.yield_per_pressure * pressure
+        assert stiff == pytest.approx((law.yield_force + gained) / law.yield_break)
 
 
 @pytest.mark.parametrize("seed", range(4))
