@@ -231,6 +231,8 @@ class FlexibleBase:
 
     def least_gain_of(self, cause: Cause, model: Candidate) -> float:
         """Return the gain from which a common difference of a model is named."""
+        if cause.lawlike and not cause.by_nature:
+            return self.rule.unusual_gain
         others = [c for c, _ in model.causes if c.name != cause.name]
         apart = cause.by_nature or cause.name in self.shown
         apart = apart or not any(c.lawlike for c in others)

@@ -49,6 +49,8 @@ class Rule:
     common_gain: float = 0.3
     # gain of a common difference or a further cause that is like another law
     lawlike_further: float = 1.0
+    # gain of a common difference that is like another law and that not every rig has
+    unusual_gain: float = 1.5
     # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
     # this share of the gain of a model that leaves only noise: otherwise it corrects the first form
     second_gain: float = 0.1

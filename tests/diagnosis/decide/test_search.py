@@ -97,18 +97,18 @@ def test_difference_that_changes_nothing_is_dropped_and_the_others_stay():
     assert blocks.gain(less.errors, model.errors) == pytest.approx(0.0, abs=1e-3)
 
 
-def test_difference_like_another_law_beside_one_is_named_only_with_its_own_gain():
+def test_unusual_difference_like_another_law_is_named_only_with_its_own_gain():
     line = Line()
     causes = [
-        Cause(n, n, (Form(n, (Term(n, (0.1,)),)),), common=True, lawlike=True)
-        for n in ("slope", "offset")
+        Cause(n, n, (Form(n, (Term(n, (0.1,)),)),), common=True, lawlike=True, by_nature=usual)
+        for n, usual in (("slope", True), ("offset", False))
     ]
     truth = np.array([1.2, 2.0, 0.6, 0.24, 0.0, 0.0])
     problem, blocks, base = fitted(line, line.free("gain"), line.free("lag"), truth=truth)
     flexible = FlexibleBase(problem, line, blocks, base, Rule())
     model = flexible.fitted([(cause, cause.forms[0]) for cause in causes])
     gain = flexible.expected(model)["offset"]
-    assert OBVIOUS < gain < Rule().lawlike_further
+    assert OBVIOUS < gain < Rule().unusual_gain
     needed = flexible.needed(model)
     assert needed.names == ("slope",)
     assert "offset" in needed.fit.values()
