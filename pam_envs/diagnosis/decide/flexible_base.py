@@ -140,24 +140,36 @@ class FlexibleBase:
         return made
 
     def alternatives(self, causes: Sequence[Cause], normal: Candidate) -> Iterator[Candidate]:
-        """Yield bases with friction of one kind alone, unless they are far worse than ``normal``.
+        """Yield other bases, unless they are far worse than ``normal``.
 
-        An effect that is no common difference may have led the selection to another friction.
+        These have friction of one kind alone, where the calibration gives starting values of it, or
+        else every difference: an effect that is no common difference may have led the selection to
+        another base.
         """
-        chosen = self.chosen(causes)
-        for guess in self.others():
-            alone = []
-            for cause, form in chosen:
-                shown = cause.name in self.shown
-                terms = tuple(t for t in form.terms if shown or t.name in guess)
-                if any(t.amount for t in terms) and (not shown or cause.name in normal.names):
-                    alone.append((cause, replace(form, terms=terms)))
-            model = replace(self, guesses=(guess,)).fitted(alone, 0)
-            if self.blocks.gain(normal.errors, model.errors) < -FAR:
-                continue
-            model = self.anchored(self.sparse(self.begun(model)))
-            complete_jacobian(self.problem, model.fit)
-            yield model
+        chosen, guesses = self.chosen(causes), self.others()
+        models = [self.with_one_friction(chosen, normal, guess) for guess in guesses]
+        if not guesses and any(cause.name not in normal.names for cause, _ in chosen):
+            models = [self.fitted(chosen)]
+        for model in models:
+            if self.blocks.gain(normal.errors, model.errors) >= -FAR:
+                made = self.anchored(self.sparse(self.begun(model)))
+                complete_jacobian(self.problem, made.fit)
+                yield made
+
+    def with_one_friction(
+        self,
+        chosen: Sequence[tuple[Cause, Form]],
+        normal: Candidate,
+        guess: Mapping[str, float],
+    ) -> Candidate:
+        """Return the base with the differences of a guess, and the shown ones of ``normal``."""
+        alone = []
+        for cause, form in chosen:
+            shown = cause.name in self.shown
+            terms = tuple(t for t in form.terms if shown or t.name in guess)
+            if any(t.amount for t in terms) and (not shown or cause.name in normal.names):
+                alone.append((cause, replace(form, terms=terms)))
+        return replace(self, guesses=(guess,)).fitted(alone, 0)
 
     def fitted(self, causes: Sequence[tuple[Cause, Form]], starts: int = STARTS) -> Candidate:
         """Return the base extended by some causes at once, from the best of several starts."""
