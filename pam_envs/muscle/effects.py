@@ -218,7 +218,7 @@ class LengthYieldTailEffects(LengthYieldEffects):
 
 
 LEAST_STIFFER = 1e-9
-"""Stiffness over that without pressure, below which the element counts as without friction."""
+"""Stiffness over that without pressure, below which the element has no friction."""
 
 
 @kernel

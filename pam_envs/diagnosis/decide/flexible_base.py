@@ -142,9 +142,9 @@ class FlexibleBase:
     def alternatives(self, causes: Sequence[Cause], normal: Candidate) -> Iterator[Candidate]:
         """Yield other bases, unless they are far worse than ``normal``.
 
-        These have friction of one kind alone, where the calibration gives starting values of it, or
-        else every difference: an effect that is no common difference may have led the selection to
-        another base.
+        Each has friction of one kind alone, if the calibration gives starting values of it. Without
+        such values there is one base, with every difference, if ``normal`` lacks one. An effect
+        that is no common difference may have led the selection to the wrong base.
         """
         chosen, guesses = self.chosen(causes), self.others()
         models = [self.with_one_friction(chosen, normal, guess) for guess in guesses]

@@ -47,9 +47,9 @@ class Rule:
     # gain of a common difference from the base (another law, another drive of the friction) above
     # which it is named; a smaller one is a calibration
     common_gain: float = 0.3
-    # gain of a common difference or a further cause that is like another law
+    # gain of a further cause that is like another law
     lawlike_further: float = 1.0
-    # gain of a common difference that is like another law and that not every rig has
+    # gain of a common difference that is like another law and that few rigs have
     unusual_gain: float = 1.5
     # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
     # this share of the gain of a model that leaves only noise: otherwise it corrects the first form

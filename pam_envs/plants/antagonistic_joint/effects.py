@@ -112,7 +112,7 @@ def yield_of(rows: Any, fixed: Any, j: int, m: int) -> tuple[float, float]:
 
 
 @kernel
-def yield_share(rows: Any, fixed: Any, j: int, m: int) -> float:
+def stiffness_ratio(rows: Any, fixed: Any, j: int, m: int) -> float:
     """Return the stiffness of the yielding friction over that of the other friction."""
     drive = rows[PAIR.effective + m][j]
     stiff, _ = yield_spring(fixed, j, PAIR.soft, drive)
@@ -125,7 +125,7 @@ def peek_yield(rows: Any, fixed: Any, m: int, operators: int, first: int, last: 
     for k in range(m, m + operators):
         for j in range(first, last):
             deflection, slope = yield_of(rows, fixed, j, k)
-            share = yield_share(rows, fixed, j, k)
+            share = stiffness_ratio(rows, fixed, j, k)
             rows[PAIR.lag + k][j] = rows[PAIR.lag + k][j] + share * deflection
             rows[PAIR.stick + k][j] = rows[PAIR.stick + k][j] + share * slope
 
@@ -140,7 +140,7 @@ def move_yield(rows: Any, fixed: Any, m: int, operators: int, first: int, last: 
                 deflection,
                 rows[PAIR.at + k][j],
             )
-            share = yield_share(rows, fixed, j, k)
+            share = stiffness_ratio(rows, fixed, j, k)
             rows[PAIR.lag + k][j] = rows[PAIR.lag + k][j] + share * deflection
 
 

@@ -245,7 +245,7 @@ class ElbowOrthosis(Plant, rows=K):
     def stiffness(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
         """Return the stiffness ``S = -K_q`` [N m/rad] at held pressures [Pa], Eq. (22).
 
-        With that of the law's correction.
+        It includes the correction of the force law.
         """
         c_a, c_b = self.pulley.contractions(angle)
         k_a = self._growth(self.bundle_a, pressure_a, c_a)
