@@ -133,8 +133,14 @@ class Selection:
         for form in self.limit.forms:
             if not flows and not any(t.name in known for t in form.terms):
                 limits += [frees_for(family, form, values) for values in form.starts]
-        fits = [Fit.at_start((*o, *limit), family.column) for o in orders for limit in limits]
+        tried = [(*order, *limit) for order in orders for limit in limits]
+        fits = [Fit.at_start(frees, family.column) for frees in tried]
         chosen = self.simplest(fits, LONG_ROUNDS)
+        # simpler ones that were behind begin again where it ended
+        found = chosen.values()
+        simpler = [frees for frees in tried if {f.name for f in frees} < set(found)]
+        again = [Fit.at_start(start_at_guess(frees, found), family.column) for frees in simpler]
+        chosen = self.simplest([*sorted(again, key=_size), chosen], LONG_ROUNDS)
         return with_values(family, chosen, STAGES), chosen
 
     def aside(self, family: MuscleFamily) -> tuple[Free, ...]:
@@ -355,6 +361,10 @@ class Selection:
         return simplest(self.only, self.blocks, fits, rounds)
 
 
+def _size(fit: Fit) -> int:
+    return len(fit.frees)
+
+
 def is_shut(family: MuscleFamily) -> bool:
     """Return whether the valve is shut in some samples."""
     return bool(np.any(family.inputs.command < 0.0))
@@ -396,6 +406,7 @@ def simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GU
         more = len(fits[k].frees) > len(fits[chosen].frees)
         if blocks.gain(errors[chosen], errors[k]) > (ORDER_GAIN if more else 0.0):
             chosen = k
+    improve(problem, [fits[chosen]], rounds - RACE, 1e-4, FEW_DAMPINGS)  # it may have been behind
     return fits[chosen]
 
 

@@ -88,9 +88,9 @@ def readings(
     return {name: v + random.normal(0.0, sizes[name], len(v)) for name, v in found.items()}
 
 
-def recorded(**hidden: float) -> Recording:
-    """Return a recording of a joint with hidden effects."""
-    inputs, labels = campaign(share=SHARE)
+def recorded(share: float = SHARE, **hidden: float) -> Recording:
+    """Return a recording of a joint with hidden effects, of a share of the campaign."""
+    inputs, labels = campaign(share=share)
     found = readings(joint(**hidden), inputs)
     time = PERIOD * np.arange(len(labels))
     return Recording.of_channels(time, inputs, found, plant=SHEET.plant, segment=labels)

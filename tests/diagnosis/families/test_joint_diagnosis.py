@@ -54,7 +54,9 @@ def write(path, signals, labels):
 @needs_kernels
 @pytest.mark.parametrize("name", HIDDEN)
 def test_hidden_effect_is_named_and_explains_the_error(name):
-    found = diagnose(recorded(**HIDDEN[name]), rig=SHEET, progress=False)
+    # creep needs the whole campaign: on the shorter one equally good fits explain 0.85 or 0.91
+    share = 1.0 if name == "creep" else SHARE
+    found = diagnose(recorded(share, **HIDDEN[name]), rig=SHEET, progress=False)
     assert (found.verdict, found.causes) == ("named", (name,))
     explained = found.report["explained"]
     worst = max(explained, key=lambda c: explained[c]["before"] / explained[c]["floor"])
