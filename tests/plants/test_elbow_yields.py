@@ -95,8 +95,10 @@ def test_force_of_a_bundle_lacks_that_of_the_viscosity_of_its_muscles(kind):
         assert force - made[f"force_{side}"] == pytest.approx(lost, abs=1e-6)
 
 
-def test_stiffness_is_the_derivative_of_the_corrected_torque():
+@pytest.mark.parametrize("shift", [0.0, -30.0])  # [N]; the second makes bundles slack
+def test_stiffness_is_the_derivative_of_the_corrected_torque(shift):
     terms = {
+        "muscle.map_00": shift,
         "muscle.map_02": 3.0,
         "muscle.map_12": -2.0,
         "muscle.map_30": 4.0,

@@ -24,13 +24,14 @@ from pam_envs.diagnosis.fit.least_squares import (
     column_of,
     no_violations,
 )
-from pam_envs.diagnosis.fit.regulator_kind import STAGES, second_orders, simplest, start_at_guess
+from pam_envs.diagnosis.fit.regulator_kind import second_orders, simplest, start_at_guess
 from pam_envs.diagnosis.fit.single_muscle import (
     CLOCK,
-    SECOND_ORDER,
     SETTINGS,
+    STAGES,
     clock_free,
     identified,
+    stages_of,
 )
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.parameters import Declaration
@@ -235,8 +236,7 @@ class CompiledFamily(UsualStart):
         """Return the base parameters, with those of effects that the plant already has."""
         names = [n for n in self.settings if not (self.measured_drive and in_valve(n))]
         if not self.measured_drive:
-            for order in SECOND_ORDER:
-                names += order if self.plant.value(next(iter(order))) > 0.0 else ()
+            names += stages_of(self.plant)
         names += [CLOCK] if self.lead else []
         names += [f"{WEIGHT}{k}]" for k in range(self.elements)]
         present = [

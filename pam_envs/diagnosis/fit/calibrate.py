@@ -20,13 +20,13 @@ from pam_envs.diagnosis.fit.least_squares import (
 )
 from pam_envs.diagnosis.fit.regulator_kind import (
     FINE_STEP,
-    STAGES,
     Selection,
     column_with,
     start_at_guess,
 )
 from pam_envs.diagnosis.fit.single_muscle import (
     LAG,
+    STAGES,
     START,
     MuscleFamily,
     spanning,

@@ -37,6 +37,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
     ORIFICES,
     SECOND_ORDER,
     SPEEDS,
+    STAGES,
     MuscleFamily,
 )
 from pam_envs.plants.single_muscle import rows as R
@@ -70,9 +71,6 @@ INTEGRALS, RELEASES = (10.0, 40.0), (0.1, 0.5)
 """Gain [1/s2] and release time [s] of an integral part at which a fit starts."""
 CHARACTERISTICS = ((0.95, 0.9, 0.8, 0.6), (0.7, 0.5, 0.3, 0.15), (1.3, 1.6, 1.8, 1.9))
 """Values of :data:`SPEEDS` at which a fit starts."""
-
-STAGES = frozenset(name for order in SECOND_ORDER for name in order)
-"""Parameters of regulators of second order."""
 
 Made = tuple[MuscleFamily, Fit]
 """A family with a kind of regulator, and its fit; a kind that cannot be tried gives None."""

@@ -104,15 +104,20 @@ PILOT = {"regulator.pilot_lag": 0.02, "regulator.pilot_damping": 1.0}
 SPOOL = {"regulator.rate_lag": 0.02}
 """Starting value of the lag of the rate, of a regulator of second order whose rate is limited."""
 SECOND_ORDER = (PILOT, SPOOL)
+STAGES = frozenset(name for order in SECOND_ORDER for name in order)
+"""Parameters of regulators of second order."""
 BASE = tuple(
-    name
-    for name in SETTINGS
-    if name not in {*PILOT, *SPOOL, *INTEGRAL, *ORIFICES, *SPEEDS, BORE, START}
+    name for name in SETTINGS if name not in {*STAGES, *INTEGRAL, *ORIFICES, *SPEEDS, BORE, START}
 )
 CLOCK = "clock.offset"
 """Time [s] by which the readings lag the command: no parameter of the plant."""
 USUAL_ROWS = 2.5
 """Sampling periods within which the clocks of command and readings agree, if not declared."""
+
+
+def stages_of(plant: Any) -> list[str]:
+    """Return the parameters of the second orders that the regulator of a plant has."""
+    return [n for order in SECOND_ORDER if plant.value(next(iter(order))) > 0.0 for n in order]
 
 
 def clock_of(recording: Any, rig: Any) -> float:
@@ -255,8 +260,7 @@ class MuscleFamily:
         flows = self.plant.air == "flow"
         names = [name for name in BASE if not (flows and name == LAG)]
         names += [*((*ORIFICES, BORE) if flows else ()), *((CLOCK,) if self.clock > 0.0 else ())]
-        for order in SECOND_ORDER:
-            names += order if self.plant.value(next(iter(order))) > 0.0 else ()
+        names += stages_of(self.plant)
         names += [name for name in INTEGRAL if self.plant.regulator.integral > 0.0]
         names += [f"hysteresis.weight[{k}]" for k in range(self.plant.elements)]
         present = [
