@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.diagnosis.worlds import WORLDS, Rig, draw_rig, simulate, truth_of
+from tests.diagnosis.worlds import WORLDS, Rig, draw_effect, draw_rig, simulate, truth_of
 from tests.diagnosis.worlds.laws import LAWS, balance, force
 from tests.diagnosis.worlds.loop_draws import DRAWS, Operator
 from tests.diagnosis.worlds.loops import SIZE, loop_step, start_loop
@@ -237,3 +237,22 @@ def test_cascade_starts_without_slope_and_does_not_overshoot() -> None:
         rates = np.diff(pressure)
         assert int(np.argmax(rates)) >= 2
         assert rates.min() > -1e-6
+
+
+@pytest.mark.parametrize("number", [1, 6, 7])
+def test_slower_exhaust_of_a_regulator_of_second_order_keeps_with_the_integrators_step(number):
+    world, rng = WORLDS[number], np.random.default_rng(FIRST_SEED)
+    rig = draw_rig(world, rng, False)
+    effect = draw_effect("exhaust_asymmetry", rig, rng)
+    fall = steps([5.0, 1.0])
+
+    def delayed(step: float) -> np.ndarray:
+        """Pressure that the effect leaves too high [bar]."""
+        normal, slower = (
+            simulate(rig, pairs, fall, step=step)["pressure_bar"] for pairs in ([], [(effect, 8.0)])
+        )
+        return slower - normal
+
+    usual, finer = delayed(1e-3), delayed(2.5e-4)
+    assert usual.max() > 0.1
+    assert np.abs(usual - finer).max() < 0.15 * usual.max()

@@ -52,13 +52,19 @@ SCALARS = (
 
 
 @njit(cache=True)
-def _limit(rate: float, eff: np.ndarray, valve: np.ndarray, kind: int, p: float) -> float:
-    """Slow a rate of pressure down [bar/s]: asymmetry, then rate limits."""
-    if rate < 0.0 and eff[EXHAUST, 0] > 0.0:
-        size = eff[EXHAUST, 0]
-        if eff[EXHAUST, 1] > 0.5:
-            size *= math.exp(-p / eff[EXHAUST, 2])
-        rate /= 1.0 + size
+def _slowed(rate: float, eff: np.ndarray, p: float) -> float:
+    """Return a rate of pressure [bar/s] whose exhaust is slower than filling."""
+    size = eff[EXHAUST, 0]
+    if rate >= 0.0 or size <= 0.0:
+        return rate
+    if eff[EXHAUST, 1] > 0.5:
+        size *= math.exp(-p / eff[EXHAUST, 2])
+    return rate / (1.0 + size)
+
+
+@njit(cache=True)
+def _limited(rate: float, eff: np.ndarray, valve: np.ndarray, kind: int) -> float:
+    """Return a rate of pressure [bar/s] within the limits of its regulator."""
     slope = valve[3] if rate > 0.0 else valve[4]
     added = 0.0
     if eff[SLEW, 0] > 0.0:
@@ -161,8 +167,12 @@ def run(
             if eff[DROOP, 0] > 0.0 and eff[DROOP, 1] < 0.5:
                 supply -= eff[DROOP, 0] * st[6]
             rate = valve_rate(valve_kind, valve, p, vs, target, supply, dt)
-            rate = _limit(rate, eff, valve, valve_kind, p)
-            vs[0] = rate
+            if valve_kind == 1:  # the exhaust throttles what the spool of second order lets through
+                vs[0] = _limited(rate, eff, valve, valve_kind)
+                rate = _slowed(vs[0], eff, p)
+            else:
+                rate = _limited(_slowed(rate, eff, p), eff, valve, valve_kind)
+                vs[0] = rate
         if valve_kind == FLOWS[0] or valve_kind == FLOWS[1] or valve_kind == FLOWS[2]:
             swell = 1.0 + 4.0 * x / length
             rate = rate / swell - (p + AMBIENT) * 4.0 * v / (length * swell)
