@@ -34,9 +34,11 @@ HELD_OUT = (
 """Worlds that are never used in the development of the diagnosis."""
 TUNED = tuple(world for world in WORLDS if world not in HELD_OUT)
 """Worlds on which the diagnosis is developed."""
+BENT = "sensor_nonlinearity"
+"""Cause whose form for the pressure also names a regulator that is not linear."""
 BY_NATURE = (
     *("static_law", "hysteresis_shape", "hysteresis_drive"),
-    *("slew_limit", "dead_time", "exhaust_asymmetry"),
+    *("slew_limit", "dead_time", "exhaust_asymmetry", BENT),
 )
 """Names that a clean rig may deserve: it differs from the base plant by nature."""
 
@@ -79,7 +81,7 @@ def deserved(rig: Any) -> list[str]:
     """Return the names that are right on a clean rig, since it differs from the base by nature.
 
     A rig of another world has another force law and other loops. Its rate limit, dead time,
-    exhaust and drive of the loop are right only where they are present.
+    exhaust, drive of the loop and nonlinear regulator are right only where they are present.
     """
     if isinstance(rig, hidden.Base):
         return []

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.diagnosis.cases import NOISE, Case, Made, Unmade, make
 from benchmarks.diagnosis.next import DrivenRig, OracleRig, again
-from benchmarks.diagnosis.sources import HOME, deserved
+from benchmarks.diagnosis.sources import BENT, HOME, deserved
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import provenance
 from benchmarks.scoring.group import rms
@@ -44,6 +44,8 @@ def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
         spent["runtime_s"] = clock.perf_counter() - started
         record |= outcome(found) | {"traces": trace_errors(made, found)}
         record["nature"] = deserved(made.ground.base)
+        if any(c["name"] == BENT and c["form"] != "pressure" for c in found.report["causes"]):
+            record["nature"] = [name for name in record["nature"] if name != BENT]
         if "loop" in stages and loops(case):
             record["loop"] = loop_of(made, found)
         if "next" in stages and promised(record):

@@ -44,6 +44,7 @@ class Form:
     # search for starting values from the base's fit, instead of those of the terms
     # (pam_envs.diagnosis.fit.starting_values)
     search: Callable[..., Sequence[Sequence[float]]] | None = None
+    title: str = ""  # name in a sentence, where that of the cause claims more than the form shows
 
     def start(self, k: int) -> list[float]:
         """Return the ``k``-th starting value of each term, the last one of those with fewer."""
@@ -99,6 +100,10 @@ class Cause:
             if word not in NEEDS:
                 hint = near(str(word), NEEDS)
                 raise ValueError(f"{self.name} needs {word!r}, which no recording has{hint}")
+
+    def title_of(self, form: Form) -> str:
+        """Return the name in a sentence of one of its forms."""
+        return form.title or self.title
 
     @property
     def in_valve(self) -> bool:

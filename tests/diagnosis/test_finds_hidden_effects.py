@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from benchmarks.diagnosis.cases import Case
-from benchmarks.diagnosis.sources import BY_NATURE
 from benchmarks.diagnosis.study import study
 from tests.diagnosis.conftest import needs_kernels
 
@@ -70,14 +69,14 @@ def test_hidden_effect_is_found_in_a_rig_of_another_world(case, records):
     found = records[case]
     assert found["failure"] is None
     assert found["verdict"] in ("named", "ambiguous")
-    assert [name for name in found["names"] if name not in BY_NATURE][:1] == [case.names[0]]
+    assert [name for name in found["names"] if name not in found["nature"]][:1] == [case.names[0]]
 
 
 @pytest.mark.parametrize("case", CLEAN_WORLDS, ids=lambda case: case.world)
 def test_clean_rig_of_another_world_has_no_cause(case, records):
     found = records[case]
     assert found["failure"] is None
-    assert set(found["names"]) <= set(BY_NATURE)
+    assert set(found["names"]) <= set(found["nature"])
 
 
 @pytest.mark.parametrize("case", ADEQUATE, ids=lambda case: case.kind)

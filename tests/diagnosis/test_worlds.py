@@ -204,6 +204,6 @@ def test_several_effects_at_once_and_one_given_twice() -> None:
 
 def test_truth_of_the_normal_physics() -> None:
     truths = [truth_of(rig_of(world)) for world in WORLDS]
-    for cause in ("slew_limit", "dead_time", "hysteresis_drive", "exhaust_asymmetry"):
+    for cause in truths[0]:
         found = [truth[cause] for truth in truths]
         assert any(found) and not all(found)

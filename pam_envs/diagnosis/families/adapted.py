@@ -123,7 +123,7 @@ def _form(
         search = replace(search, values=values)
     elif search is not None and not all(there):
         return None
-    return Form(form.name, kept, search)
+    return replace(form, terms=kept, search=search)
 
 
 def _term(

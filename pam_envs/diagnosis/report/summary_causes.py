@@ -58,7 +58,7 @@ def causes(study: Any) -> list[Json]:
         made.append(
             {
                 "name": cause.name,
-                "title": cause.title,
+                "title": cause.title_of(form),
                 "form": form.name,
                 "parameters": [
                     {
@@ -173,7 +173,7 @@ def _rival(study: Any, k: int, rival: Candidate, row: Mapping[str, Any], why: st
         where, again = study.compared, rival
     return {
         "name": "+".join(rival.names),
-        "title": " and ".join(c.title for c, _ in rival.causes),
+        "title": " and ".join(c.title_of(form) for c, form in rival.causes),
         "form": ", ".join(f.name for _, f in rival.causes),
         "held_out": where.choice.by,
         "gain": where.gain(where.base, again),

@@ -123,6 +123,16 @@ def test_only_muscles_in_pairs_have_a_fault_among_their_common_differences():
     assert set.union(*found.values()) == {"unequal_muscles"}
 
 
+@pytest.mark.parametrize("name", KINDS)
+def test_nonlinear_pressure_is_that_of_its_sensor_or_of_the_regulator(name):
+    kind = kind_named(name)
+    cause = next(c for c in kind.causes(kind.catalogue) if c.name == "sensor_nonlinearity")
+    titles = {form.terms[0].name: cause.title_of(form) for form in cause.forms}
+    of_pressure = {"regulator" in title for term, title in titles.items() if "pressure" in term}
+    assert of_pressure == {True}
+    assert any("regulator" not in title for title in titles.values())
+
+
 def test_sensor_causes_of_a_knee_have_forms_of_angle_and_tension():
     kind = kind_named("knee_orthosis")
     delay = next(c for c in kind.causes(kind.catalogue) if c.name == "sensor_delay")

@@ -192,11 +192,11 @@ UNLIKE = 0.03
 
 
 def truth_of(rig: Rig) -> dict[str, bool]:
-    """Return which of four causes the normal physics of a rig contains.
+    """Return which of five causes the normal physics of a rig contains.
 
     A choked orifice and a turbulent restriction limit the rate of large steps, so they count as
     a rate limit. The exhaust differs where orifice, rate limit or lag differ by more than 3 % from
-    those of filling.
+    those of filling. A pressure that is not proportional to the setpoint is a nonlinear reading.
     """
     value = rig.valve_value
     pairs = (
@@ -211,4 +211,5 @@ def truth_of(rig: Rig) -> dict[str, bool]:
         "dead_time": value("dead_time_s") >= 0.01,
         "hysteresis_drive": rig.length_driven,
         "exhaust_asymmetry": any(abs(b - a) > UNLIKE * a for a, b in pairs),
+        "sensor_nonlinearity": any(value(key) != 0.0 for key in ("bulge_bar", "tilt_bar")),
     }

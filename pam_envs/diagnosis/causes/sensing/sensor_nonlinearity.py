@@ -2,10 +2,15 @@
 
 Potentiometers, draw-wire sensors and bridges follow their calibration line at the ends and deviate
 between them. The error is a parabola and an S that vanish at zero and at full scale. It is not
-separable from a static law of the same curvature, unless that law acts at several loads.
+separable from a static law of the same curvature, unless that law acts at several loads. A
+nonlinear pressure reading is not separable from a regulator whose pressure is not proportional to
+its setpoint: the static law absorbs the difference between the two pressures.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
+
+TITLES = {"pressure": "the nonlinearity of the pressure sensor or of the regulator"}
+"""Names in a sentence of the forms that show more than a sensor."""
 
 CAUSE = Cause(
     name="sensor_nonlinearity",
@@ -17,6 +22,7 @@ CAUSE = Cause(
                 Term(f"{sensor}.bow", (0.01, -0.01), scale=0.01),
                 Term(f"{sensor}.wave", (0.01,), scale=0.01),
             ),
+            title=TITLES.get(sensor, ""),
         )
         for sensor in ("position", "pressure")
     ),
@@ -24,8 +30,8 @@ CAUSE = Cause(
     neighbours=("sensor_bias", "sensor_drift", "static_law"),
     experiment=(
         "Measure the same staircase against a second sensor or gauge blocks: only this "
-        "separates a nonlinear position reading from the muscle's own curve. A nonlinear pressure "
-        "reading is visible against the command."
+        "separates a nonlinear position reading from the muscle's own curve, and a nonlinear "
+        "pressure reading from a regulator with a nonlinear characteristic."
     ),
     source="Data sheets of proportional regulators: linearity within 1 % of full scale.",
     settled="the static law absorbs it exactly",
