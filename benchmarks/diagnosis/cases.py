@@ -1,8 +1,8 @@
 """Cases of the diagnosis benchmark: a drawn rig, hidden effects of given size, and a recording.
 
 The *size* of an effect is the RMS, over the noise, of the part of its trace that a refit of the
-plant's base parameters does not absorb, on the output where it is largest. The refit is to the
-noise-free clean rig. A case gives a target size, for which the amplitude is solved. The diagnosis
+plant's flexible base does not absorb (:mod:`benchmarks.diagnosis.absorbed`), on the output where it
+is largest. A case gives a target size, for which the amplitude is solved. The diagnosis
 sees only recording and rig file.
 """
 
@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.diagnosis.absorbed import Absorbed
 from benchmarks.diagnosis.sources import (
     HOME,
     Effects,
@@ -29,9 +30,7 @@ from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.noise import noise_floor
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.decide.isolability import projected
 from pam_envs.diagnosis.diagnosis import Study
-from pam_envs.diagnosis.fit.least_squares import Problem
 from pam_envs.diagnosis.fit.single_muscle import start_plant
 from tests.diagnosis import hidden
 
@@ -119,24 +118,24 @@ class Truth:
 
 @dataclass(frozen=True)
 class Ground:
-    """A clean rig under a campaign, and the subspace of the changes that a refit can make."""
+    """A clean rig under a campaign, and the changes that a refit can make."""
 
     base: Any  # the rig
     campaign: hidden.Campaign
     clean: Array  # outputs without effect and noise [m], [Pa], shape (2, T)
-    basis: Array  # orthonormal basis of the subspace
-    problem: Problem | None  # order of the residuals; None without a basis
+    absorbed: Absorbed | None  # None if no size is asked
 
-    def left(self, trace: Array) -> Array:
-        """Return the part of a trace (2, T) [m], [Pa] that a refit does not absorb, over noise."""
-        if self.problem is None:
-            return trace / NOISE[:, None]
-        whole = self.problem.vectors((trace / NOISE[:, None]).reshape(1, -1))
-        return self.problem.rows(projected(whole, self.basis)[0])
+    def left(self, trace: Array, name: str) -> Array:
+        """Return the part of the trace of an effect that a refit does not absorb, over noise.
 
-    def size(self, trace: Array) -> float:
-        """Return the size of a trace."""
-        return loudest(self.left(trace)) if np.isfinite(trace).all() else np.inf
+        The trace has the shape (2, T) [m], [Pa].
+        """
+        rows = trace / NOISE[:, None]
+        return rows if self.absorbed is None else self.absorbed.left(rows, name)
+
+    def size(self, trace: Array, name: str) -> float:
+        """Return the size of the trace of an effect."""
+        return loudest(self.left(trace, name)) if np.isfinite(trace).all() else np.inf
 
 
 @dataclass(frozen=True)
@@ -192,12 +191,12 @@ def ground_of(case: Case, base: Any, campaign: hidden.Campaign) -> Ground:
     """Fit the plant's flexible base to a recording of a clean rig."""
     clean = outputs_of(base, [], campaign)
     if not case.names:  # nothing whose size is asked
-        return Ground(base, campaign, clean, np.zeros((0, clean.size)), None)
+        return Ground(base, campaign, clean, None)
     recording, sheet = observed(replace(case, noise=1.0), base, [], campaign, "clean")
     floor = noise_floor(recording, sheet)
     study = Study.begin(recording, sheet, start_plant(sheet), floor)
     study.make_flexible(catalogue())
-    return Ground(base, campaign, clean, study.subspace, study.problem)
+    return Ground(base, campaign, clean, Absorbed.of(study, catalogue(), clean))
 
 
 def solve(ground: Ground, effect: Any, target: float) -> tuple[float, Array] | None:
@@ -205,7 +204,7 @@ def solve(ground: Ground, effect: Any, target: float) -> tuple[float, Array] | N
     low, high, amplitude = 0.0, np.inf, min(1.0, target)
     for _ in range(ROUNDS):
         trace = outputs_of(ground.base, [(effect, amplitude)], ground.campaign) - ground.clean
-        size = ground.size(trace)
+        size = ground.size(trace, effect.name)
         if abs(np.log(max(size, 1e-9) / target)) < NEAR:
             return amplitude, trace
         low, high = (amplitude, high) if size < target else (low, amplitude)
@@ -286,7 +285,7 @@ def _truths(
             others = [(e, a) for i, (e, a, _) in enumerate(found) if i != k]
             trace = outputs - outputs_of(ground.base, others, ground.campaign)
         raw = loudest(alone / NOISE[:, None])
-        yield Truth(effect, amplitude, ground.size(alone), raw, trace)
+        yield Truth(effect, amplitude, ground.size(alone, effect.name), raw, trace)
 
 
 SMALL: dict[str, int] = {

@@ -150,7 +150,7 @@ def trace_errors(made: Made, found: Diagnosis) -> dict[str, dict[str, Any]]:
             continue
         shown = found.traces.effects[truth.name]
         trace = np.stack([shown[name] for name in OUTPUTS])
-        true, ours = made.ground.left(truth.trace), made.ground.left(trace)
+        true, ours = (made.ground.left(one, truth.name) for one in (truth.trace, trace))
         k = int(np.argmax((true**2).mean(axis=1)))
         size = rms(true[k])
         errors[truth.name] = {

@@ -22,7 +22,7 @@ from pam_envs.diagnosis.decide import isolability as iso
 from pam_envs.diagnosis.decide.compare import p_value, possible_gain
 from pam_envs.diagnosis.decide.flexible_base import FlexibleBase, shapes_of
 from pam_envs.diagnosis.decide.held_out import HeldOut, choose, compared, hold_out, interleaved
-from pam_envs.diagnosis.decide.isolability import base_subspace, not_testable, unseen_rivals
+from pam_envs.diagnosis.decide.isolability import not_testable, unseen_rivals
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.screen import Screen
 from pam_envs.diagnosis.decide.search import search
@@ -324,18 +324,6 @@ class Study:
     def problem(self) -> Problem:
         """Readings and simulation of the fits."""
         return self.fitted.problem
-
-    @property
-    def subspace(self) -> Array:
-        """Orthonormal basis of the changes that a refit of the flexible base can make, (k, m)."""
-        made = []
-        for k in range(len(self.problem.measured)):
-            for shape in self.problem.shapes:
-                rows = np.zeros(self.problem.measured.shape)
-                rows[k] = shape
-                made.append(self.problem.vectors(rows.reshape(1, -1))[0])
-        stacked = np.vstack([base_subspace(self.normal.fit), *made])
-        return np.asarray(np.linalg.qr(stacked.T)[0].T)
 
     @property
     def flexible(self) -> FlexibleBase:

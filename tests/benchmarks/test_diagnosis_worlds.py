@@ -102,7 +102,7 @@ def _clean_ground(case: Case, base: Any, campaign: Any) -> Any:
     from benchmarks.diagnosis.sources import outputs_of
 
     clean = outputs_of(base, [], campaign)
-    return Ground(base, campaign, clean, np.zeros((0, clean.size)), None)
+    return Ground(base, campaign, clean, None)
 
 
 def test_effect_that_never_reaches_its_size_is_unmade(monkeypatch):
@@ -197,3 +197,31 @@ def test_same_records_give_same_files(tmp_path):
     assert [path.name for path in one] == ["diagnosis_worlds.md", "diagnosis_worlds.json"]
     assert [path.read_bytes() for path in one] == [path.read_bytes() for path in two]
     assert len(json.loads(one[1].read_text())["cases"]) == 2
+
+
+class Flat:
+    """Order of residuals that of the samples."""
+
+    @staticmethod
+    def vectors(rows):
+        return np.asarray(rows)
+
+    @staticmethod
+    def rows(vector):
+        return np.reshape(vector, (2, -1))
+
+
+def test_refit_absorbs_what_other_differences_of_the_base_can_make():
+    """A hidden effect may call for a difference that the clean rig did not need."""
+    from benchmarks.diagnosis.absorbed import Absorbed
+
+    rng = np.random.default_rng(3)
+    base, friction, own = rng.normal(size=(3, 80))
+    found = Absorbed(Flat(), base[None], {"hysteresis_drive": friction[None]})
+    trace = 2.0 * base + 3.0 * friction + own
+    both = found.left(trace.reshape(2, -1), "stick_slip").ravel()
+    alone = found.left(trace.reshape(2, -1), "hysteresis_drive").ravel()
+    assert both @ base == pytest.approx(0.0, abs=1e-9)
+    assert both @ friction == pytest.approx(0.0, abs=1e-9)
+    assert alone @ base == pytest.approx(0.0, abs=1e-9)
+    assert abs(alone @ friction) > 3.0

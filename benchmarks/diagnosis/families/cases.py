@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.diagnosis.absorbed import Absorbed
 from benchmarks.diagnosis.cases import (
     LARGE,
     NEAR,
@@ -24,11 +25,9 @@ from benchmarks.diagnosis.cases import (
     loudest,
     sizes_in,
 )
-from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.noise import noise_floor
-from pam_envs.diagnosis.decide.isolability import projected
 from pam_envs.diagnosis.diagnosis import Study
 from pam_envs.diagnosis.families.kinds import kind_named
 from pam_envs.mechanics.serial_chain.chain import SerialChain
@@ -112,22 +111,22 @@ def start_of(family: str) -> Any:
 
 @dataclass(frozen=True)
 class Ground:
-    """A clean rig, and the subspace of the changes that a refit of the base can make."""
+    """A clean rig, and the changes that a refit of the base can make."""
 
     place: str
     seed: int
     clean: Recording
     sheet: Rig
     study: Study
-    basis: Array  # orthonormal, (k, m)
+    absorbed: Absorbed
 
     def recorded(self, name: str, amplitude: float) -> Recording:
         """Return the recording with an effect, in parts of its usual strength."""
         hidden = {key: amplitude * value for key, value in HIDDEN[name].items()}
         return record(*parts_of(self.place), self.seed, hidden)[0]
 
-    def size(self, recording: Recording) -> tuple[float, float]:
-        """Return the size of the effect of a recording, and that before the refit.
+    def size(self, recording: Recording, name: str) -> tuple[float, float]:
+        """Return the size of an effect in a recording, and that before the refit.
 
         The noise of both recordings is the same and cancels.
         """
@@ -137,8 +136,7 @@ class Ground:
             if channel in recording.outputs:
                 moved = recording.outputs[channel] - self.clean.outputs[channel]
                 rows[k] = moved / self.sheet.noise[channel]
-        left = problem.rows(projected(problem.vectors(rows.reshape(1, -1)), self.basis)[0])
-        return loudest(left), loudest(rows)
+        return loudest(self.absorbed.left(rows, name)), loudest(rows)
 
     def solved(self, name: str, target: float) -> tuple[Recording, float, float, float]:
         """Return the recording with an effect of a size, its amplitude, and both sizes.
@@ -151,7 +149,7 @@ class Ground:
         low, high, amplitude = FAINT, STRONGEST, 1.0
         for _ in range(ROUNDS):
             made = self.recorded(name, amplitude)
-            size, raw = self.size(made)
+            size, raw = self.size(made, name)
             if abs(np.log(max(size, 1e-9) / target)) < NEAR:
                 return made, amplitude, size, raw
             low, high = (amplitude, high) if size < target else (low, amplitude)
@@ -168,5 +166,7 @@ def ground_of(place: str, seed: int) -> Ground:
     kind, plant = kind_named(family), start_of(family)
     start = kind.start(sheet) if plant is None else plant
     study = Study.begin(recording, sheet, start, noise_floor(recording, sheet), kind)
-    study.make_flexible(kind.causes(kind.catalogue))
-    return Ground(place, seed, recording, sheet, study, study.subspace)
+    causes = kind.causes(kind.catalogue)
+    study.make_flexible(causes)
+    absorbed = Absorbed.of(study, causes, study.outputs(study.normal))
+    return Ground(place, seed, recording, sheet, study, absorbed)
