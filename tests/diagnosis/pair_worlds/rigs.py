@@ -1,4 +1,4 @@
-"""Rigs of two worlds, drawn at random, and their recordings."""
+"""Rigs of three worlds, drawn at random, and their recordings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,10 +10,12 @@ from pam_envs.data.rig_file import Rig
 from tests.diagnosis.families.joint_rig import PERIOD, campaign
 
 from . import engine as e
+from .fields import ELEMENTS, MUSCLE, VALVE
 
 WORLDS = {
     "braid": (e.BRAID, e.BOUC_WEN, e.SECOND_ORDER),
     "exponential": (e.EXPONENTIAL, e.DAHL, e.LIMITED_LAG),
+    "polynomial": (e.POLYNOMIAL, e.MAXWELL_SLIP, e.ORIFICE),
 }
 """Force law, friction and regulator of each world."""
 SUBSTEPS = 40
@@ -42,7 +44,7 @@ class Family:
     """Sizes of a family's rigs: muscles, geometry, link and motion.
 
     ``sizes`` are forces at 2 bar of the muscles of a joint [N]; ``joint`` are the fields of
-    :data:`engine.JOINT` up to ``rest``; ``link`` is length [m], mass [kg], centre [m], first angle.
+    :data:`fields.JOINT` up to ``rest``; ``link`` is length [m], mass [kg], centre [m], first angle.
     ``stop`` is the angle of the mechanical stops [rad], on either side.
     """
 
@@ -105,8 +107,27 @@ FAMILIES: dict[str, Family] = {
 }
 
 
+def _polynomial(random: np.random.Generator) -> dict[str, float]:
+    """Draw the fields of a muscle that only the polynomial law and the Maxwell slip have."""
+    parts = random.uniform(0.4, 1.6, ELEMENTS)
+    values = {
+        "curve": random.uniform(0.15, 0.45),
+        "skew": random.uniform(0.0, 0.5),
+        "threshold": random.uniform(0.08, 0.3),
+        "stiffening": random.uniform(-0.03, 0.03),
+        "bladder": random.uniform(0.06, 0.14),
+        "power": random.uniform(0.6, 1.4),
+    }
+    values |= {f"part_{k}": parts[k] / parts.sum() for k in range(ELEMENTS)}
+    # one in every octave from a third of the onset
+    return values | {f"break_{k}": 2.0 ** random.uniform(k - 1.6, k - 0.6) for k in range(ELEMENTS)}
+
+
 def _muscles(
-    family: Family, random: np.random.Generator, hidden: Mapping[str, float]
+    family: Family,
+    random: np.random.Generator,
+    hidden: Mapping[str, float],
+    law: int = e.BRAID,
 ) -> np.ndarray:
     """Draw the muscles of a joint, alike but for their size, and repeat them for every joint."""
     shape = {
@@ -118,6 +139,8 @@ def _muscles(
         "creep_s": random.uniform(3.0, 8.0),
     }
     spread, friction = random.uniform(0.9, 1.1), random.uniform(0.02, 0.04)
+    if law == e.POLYNOMIAL:
+        shape |= _polynomial(random)
     made = []
     for k, size in enumerate(family.sizes):
         own = size * spread * (1.0 + (0.5 - k) * hidden.get("unequal", 0.0))
@@ -128,12 +151,14 @@ def _muscles(
             "growth": 0.3 * friction * own,
             "loss": hidden.get("loss", 0.0) * own,
         }
-        made.append([values[name] for name in e.MUSCLE])
+        made.append([values.get(name, 0.0) for name in MUSCLE])
     return np.array(made * family.joints)
 
 
 def _valve(kind: int, random: np.random.Generator, hidden: Mapping[str, float]) -> np.ndarray:
     """Draw a regulator."""
+    if kind == e.ORIFICE:
+        return _orifice(random, hidden)
     quick = kind == e.SECOND_ORDER
     values = {
         "rate": random.uniform(22.0, 35.0) if quick else 1.0 / random.uniform(0.035, 0.07),
@@ -144,7 +169,25 @@ def _valve(kind: int, random: np.random.Generator, hidden: Mapping[str, float]) 
         "dead_s": random.uniform(0.01, 0.04),
         "band": hidden.get("band", 0.0),
     }
-    return np.array([values[name] for name in e.VALVE])
+    return np.array([values.get(name, 0.0) for name in VALVE])
+
+
+def _orifice(random: np.random.Generator, hidden: Mapping[str, float]) -> np.ndarray:
+    """Draw a proportional valve with its controller."""
+    values = {
+        "rate": 1.0 / random.uniform(0.025, 0.05),
+        "limit": random.uniform(10.0, 16.0),
+        "gain": random.uniform(0.99, 1.01),
+        "dead_s": random.uniform(0.01, 0.04),
+        "band": hidden.get("band", 0.0),
+        "reset_s": random.uniform(0.6, 1.2),
+        "spool_s": random.uniform(0.004, 0.008),
+        "supply": random.uniform(7.0, 9.0),
+        "vent": random.uniform(2.0, 3.0),
+        "widening": random.uniform(1.5, 3.5),
+        "choke": random.uniform(0.2, 0.5),
+    }
+    return np.array([values.get(name, 0.0) for name in VALVE])
 
 
 def record(
@@ -201,7 +244,7 @@ def _run(
     """Draw a rig and return its angles [rad], pressures [Pa] and forces [N], each (n, rows)."""
     family = FAMILIES[name]
     law, friction, regulator = WORLDS[world]
-    muscles = _muscles(family, random, hidden)
+    muscles = _muscles(family, random, hidden, law)
     valve = _valve(regulator, random, hidden)
     joint = np.array(family.joint) * np.array([*random.uniform(0.85, 1.15, 4), 1.0])
     bearing = [hidden.get("stiction", 0.0) * family.stiction, 0.55, 0.05, 2e-3]
