@@ -55,7 +55,15 @@ def parts_of(place: str) -> tuple[str, str]:
     return family, world
 
 
-PLACES = tuple(place_of(family, world) for family in FAMILIES for world in WORLDS)
+TUNED = ("braid", "exponential")
+"""Worlds on which the diagnosis is developed; the others are never used in its development."""
+HELD_OUT = tuple(world for world in WORLDS if world not in TUNED)
+PLACES = tuple(
+    place_of(family, world)
+    for worlds in (TUNED, HELD_OUT)
+    for family in FAMILIES
+    for world in worlds
+)
 
 
 def effects_of(family: str) -> tuple[str, ...]:

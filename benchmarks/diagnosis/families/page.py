@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.diagnosis.counts import Answer, Numbers, firsts, line, share, spread
-from benchmarks.diagnosis.families.cases import PLACES, effects_of, parts_of
+from benchmarks.diagnosis.families.cases import HELD_OUT, PLACES, effects_of, parts_of
 from benchmarks.diagnosis.markdown import (
     bullets,
     counted,
@@ -103,7 +103,9 @@ def _table(what: str, rows: Mapping[str, Numbers]) -> str:
     head += ["clean: wrong name", "clean: `unexplained`", "error", "median s"]
     lines = []
     for name, found in rows.items():
-        cells = [f"`{name}`", found["right_first"]["n"], share_text(found["right_first"])]
+        bold = "**" if parts_of(name)[1] in HELD_OUT else ""
+        first = found["right_first"]
+        cells = [f"{bold}`{name}`{bold}", first["n"], share_text(first)]
         keys = ("exact", "wrong", "unexplained", "false_names", "unexplained_clean")
         cells += [counted(found[key]) for key in keys]
         cells += [number(found["error"]), number(found["runtime_s"]["median"], ".0f")]
