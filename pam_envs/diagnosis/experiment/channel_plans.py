@@ -17,10 +17,10 @@ from pam_envs.diagnosis.experiment.plans import (
     REST,
     TRIANGLE,
     Piece,
-    enumerated,
     listed_pieces,
     near,
 )
+from pam_envs.wording import enumeration
 
 LOW, USUAL, HIGH = 0.35, 0.5, 0.65
 """Mean pressures of a pair of muscles, over the range of its pressures."""
@@ -180,6 +180,7 @@ def _of_pairs(means: ChannelMeans) -> Iterator[ChannelPlan]:
     yield ChannelPlan("two_means", words, slow, (means.apart(LOW), means.apart(HIGH)))
     if len(means.payloads) > 1:
         several = tuple(dict.fromkeys(near(means.payloads, k / 4) for k in range(5)))
-        words = f"{together}{of} under {enumerated(several)} kg in turn: ramp up and down slowly"
+        loads = enumeration([f"{load:g}" for load in several])
+        words = f"{together}{of} under {loads} kg in turn: ramp up and down slowly"
         stages = tuple(replace(usual, payload=load) for load in several)
         yield ChannelPlan("several_payloads", words, slow, stages)

@@ -15,6 +15,7 @@ from pam_envs.constants import BAR
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import load_levels
+from pam_envs.wording import enumeration
 
 PERIOD = 0.02
 WARMER = 10.0  # temperature rise of a warmed muscle [K]
@@ -201,11 +202,7 @@ def _plans(means: Means) -> Iterator[Plan]:
             words = f"slow triangles under {load:g} N"
             yield replace(slow, name=name, description=words, loads=(load,))
         several = tuple(dict.fromkeys(means.near(k / 4) for k in range(5)))
-        words = f"the same slow triangle under {enumerated(several)} N"
+        loads = enumeration([f"{load:g}" for load in several])
+        words = f"the same slow triangle under {loads} N"
         pieces = (REST, *TRIANGLE)
         yield Plan("several_loads", words, pieces, several, means.full)
-
-
-def enumerated(loads: Sequence[float]) -> str:
-    """Return "a, b and c"."""
-    return " and ".join((", ".join(f"{load:g}" for load in loads[:-1]), f"{loads[-1]:g}"))

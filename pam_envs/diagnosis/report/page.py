@@ -8,6 +8,7 @@ from typing import Any
 from pam_envs.diagnosis.figures import Picture, draw
 from pam_envs.diagnosis.figures.quantities import TIMES, changed
 from pam_envs.diagnosis.report import page_parts as pp
+from pam_envs.wording import enumeration
 
 CSS = Path(__file__).with_name("page.css")
 VERDICTS = {
@@ -56,7 +57,7 @@ def headline(report: Report) -> str:
     verdict = str(report["verdict"])
     text = VERDICTS.get(verdict, verdict)
     if verdict == "named" and titles:
-        text = pp.enumeration(list(titles.values()))
+        text = enumeration(list(titles.values()))
     elif verdict == "ambiguous" and titles:
         for rival in report.get("rivals") or []:
             if rival.get("why") == "not excluded":

@@ -5,6 +5,7 @@ from html import escape
 from typing import Any
 
 from pam_envs.diagnosis.figures.quantities import MINUS, changed
+from pam_envs.wording import enumeration
 
 DASH = "\N{EN DASH}"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -62,11 +63,6 @@ def words(value: Any) -> str:
     if isinstance(value, float):
         return number(value)
     return str(value)
-
-
-def enumeration(items: Sequence[str]) -> str:
-    """Return "a, b and c"."""
-    return " and ".join(part for part in (", ".join(items[:-1]), *items[-1:]) if part)
 
 
 def paragraph(text: str) -> str:
@@ -234,10 +230,7 @@ def experiment(report: Report) -> str:
         )
     lines.append(paragraph(text))
     segments = found.get("segments") or []
-    if all(isinstance(s, Mapping) for s in segments):
-        lines.append(pieces_table(segments))
-    else:
-        lines.append(bullets([words(s) for s in segments]))
+    lines.append(pieces_table(segments))
     title = str(found.get("name") or "").replace("_", " ")
     heading = f'<h3 id="experiment">Next experiment: {escape(title)}</h3>'
     return f'{heading}\n<div class="box">{"".join(lines)}</div>'

@@ -11,7 +11,6 @@ from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.structure import binned_r2, flexible_r2, ljung_box, spectral_peak
 from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS
 from pam_envs.diagnosis.fit.candidate import Candidate
-from pam_envs.diagnosis.report.page_parts import enumeration
 from pam_envs.diagnosis.report.summary_causes import (
     calibration,
     causes,
@@ -20,7 +19,7 @@ from pam_envs.diagnosis.report.summary_causes import (
     seen,
     unit_of,
 )
-from pam_envs.wording import package
+from pam_envs.wording import enumeration, package
 
 
 def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, Any]:
