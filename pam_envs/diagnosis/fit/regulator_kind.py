@@ -54,6 +54,8 @@ FITS = 1.2
 """Mean square of the pressure's residual over its noise below which no further kind is tried."""
 KIND_GAIN, TAIL_GAIN = 0.2, 0.3
 """Least gain of a further kind over the lags with one effect, and that of the slow tail."""
+ENOUGH = 0.7
+"""Share of the gain of a model that leaves only noise from which a smaller one is sufficient."""
 SHOWN_GAIN, CLOSE, MOST_SHOWN = 0.5, 0.7, 3
 """Least gain of an effect that the pressure shows, share of it that no other effect may reach, and
 largest number of such effects."""
@@ -116,7 +118,8 @@ class Selection:
             if not self.lacks(reached):
                 break
             made = kind(family, fit)
-            if made is not None and self.gain(reached, made[1]) >= least:
+            enough = min(least, ENOUGH * float(np.log(self.left(reached))))
+            if made is not None and self.gain(reached, made[1]) >= enough:
                 best, reached = made, made[1]
         return best
 
@@ -344,10 +347,14 @@ class Selection:
             checks=0,
         )
 
+    def left(self, fit: Fit) -> float:
+        """Return the mean square of the pressure's residual over its noise."""
+        errors = self.blocks.errors(self.only.rows(fit.residual))
+        return float(self.blocks.means(errors)[1])
+
     def lacks(self, fit: Fit) -> bool:
         """Return whether a regulator leaves more of the pressure than noise."""
-        left = self.blocks.errors(self.only.rows(fit.residual))
-        return bool(self.blocks.means(left)[1] >= FITS)
+        return self.left(fit) >= FITS
 
     def gain(self, before: Fit, after: Fit) -> float:
         """Return the gain of a fit over another one."""
