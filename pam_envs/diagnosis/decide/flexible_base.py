@@ -291,12 +291,25 @@ class FlexibleBase:
         chosen = self.chosen(causes)
         if not chosen or self.fits():
             return self.base
-        model = self.needed(self.acting(self.fitted(chosen)))
+        model = self.needed(self.with_fault_alone(chosen, self.acting(self.fitted(chosen))))
         model = self.with_needed_forms(self.sparse(self.begun(model)))
         if len(model.fit.frees) > len(self.base.fit.frees):
             model = refit(self.problem, self.blocks, model, 2)
         model = self.anchored(model)
         complete_jacobian(self.problem, model.fit)
+        return model
+
+    def with_fault_alone(self, chosen: Sequence[tuple[Cause, Form]], model: Candidate) -> Candidate:
+        """Return a model, or a smaller one whose only difference is a fault, if it is sufficient.
+
+        Beside a large fault, a fit with every difference may end far from one with that alone, and
+        refits without one of the others do not leave its valley.
+        """
+        for cause, form in chosen:
+            if not (cause.by_nature or cause.lawlike or cause.name in self.shown):
+                alone = self.fitted([(cause, form)])
+                if self.loss(alone, model) <= 0.0:
+                    return alone
         return model
 
     def anchored(self, model: Candidate) -> Candidate:

@@ -1,7 +1,7 @@
 """Base of plants that are replayed by their compiled loops, with parameter columns."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -13,9 +13,10 @@ from pam_envs.arrays import Array
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import MANY_CYCLES, SHUT_SECONDS, longest_shut
+from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.calibrate import Calibration
-from pam_envs.diagnosis.fit.candidate import fit_base
+from pam_envs.diagnosis.fit.calibrate import Calibration, replayed_by
+from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
 from pam_envs.diagnosis.fit.least_squares import (
     LANES,
     Fit,
@@ -24,10 +25,23 @@ from pam_envs.diagnosis.fit.least_squares import (
     column_of,
     no_violations,
 )
-from pam_envs.diagnosis.fit.regulator_kind import second_orders, simplest, start_at_guess
+from pam_envs.diagnosis.fit.regulator_kind import (
+    FITS,
+    Selection,
+    column_with,
+    second_orders,
+    simplest,
+    start_at_guess,
+)
 from pam_envs.diagnosis.fit.single_muscle import (
     CLOCK,
+    INTEGRAL,
+    LAG,
+    LEAST_SOURCE,
+    ORIFICES,
     SETTINGS,
+    SOURCE,
+    SPEEDS,
     STAGES,
     clock_free,
     identified,
@@ -47,10 +61,15 @@ WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hys
 ROUNDS, VALVE_ROUNDS = 25, 12
 INSTANT = {"dead_time": 0.0, "slew_rate": 1e9, "gain": 1.0}
 """Parameters of a regulator whose pressures are the measured ones."""
-STAGE_SETTINGS = {name: SETTINGS[name] for name in STAGES}
-"""Settings of the fit of a regulator of second order."""
+VALVE_SETTINGS = {n: SETTINGS[n] for n in (*STAGES, *SPEEDS, *INTEGRAL, *ORIFICES)}
+"""Settings of the fit of regulators of other kinds than a lag of first order."""
+LESS, MORE = 0.4, 2.5
+"""Conductances of orifices over the plant's at which a fit starts."""
 LEAST_LAG = 2e-3
 """Least time constant of a regulator [s]."""
+CONDUCTANCE = "regulator.conductance"
+
+Causes = Sequence[Cause]
 
 
 class UsualStart:
@@ -120,6 +139,25 @@ class CompiledFamily(UsualStart):
     def measured_drive(self) -> bool:
         """Whether the measured pressures are the inputs."""
         return self.regulator is not None
+
+    @property
+    def is_shut(self) -> bool:
+        """Whether a valve is shut in some samples."""
+        return any(bool(np.any(self.drives[k] < 0.0)) for k in self.commands)
+
+    @property
+    def orifices(self) -> dict[str, float]:
+        """Parameters of regulators with flow through their orifices, with starting values."""
+        return ORIFICES | {CONDUCTANCE: self.plant.value(CONDUCTANCE)}
+
+    @property
+    def conductances(self) -> tuple[float, ...]:
+        """Conductances of orifices [m3/(s Pa)] at which a fit starts."""
+        return tuple(share * self.plant.value(CONDUCTANCE) for share in (LESS, MORE))
+
+    def finer(self, step: float) -> "CompiledFamily":
+        """Return the family, whose steps are fine."""
+        return self
 
     @property
     def column(self) -> Array:
@@ -228,23 +266,31 @@ class CompiledFamily(UsualStart):
         d, value = self.declared(name), self.plant.value(name)
         made: dict[str, Any] = {"low": d.low, "high": d.high, "start": value}
         made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
+        if name == SOURCE:  # a muscle is filled from above its largest setpoint
+            made["low"] = max(d.low, LEAST_SOURCE * self.plant.regulator.max_pressure)
         place = self.plant.names.index(name)
-        settings = {**STAGE_SETTINGS.get(name, {}), **self.settings.get(name, {})}
+        settings = {**VALVE_SETTINGS.get(name, {}), **self.settings.get(name, {})}
         return Free(name, place, **{**made, **settings, **changes})
 
     def base(self) -> tuple[Free, ...]:
         """Return the base parameters, with those of effects that the plant already has."""
+        plant, inert = self.plant, self.plant.inert
         names = [n for n in self.settings if not (self.measured_drive and in_valve(n))]
+        names = [n for n in names if n not in inert]
         if not self.measured_drive:
-            names += stages_of(self.plant)
+            names += stages_of(plant)
+            names += (
+                INTEGRAL if INTEGRAL[0] in plant.names and plant.value(INTEGRAL[0]) > 0.0 else ()
+            )
+            names += ORIFICES if plant.air == "flow" else ()
         names += [CLOCK] if self.lead else []
         names += [f"{WEIGHT}{k}]" for k in range(self.elements)]
         present = [
             name
-            for name, off in self.plant.neutral.items()
-            if name not in names
+            for name, off in plant.neutral.items()
+            if name not in (*names, *inert)
             and name != SWITCH
-            and self.plant.value(name) != off
+            and plant.value(name) != off
             and not (self.measured_drive and in_valve(name))
         ]
         return tuple(self.free(name) for name in (*names, *present))
@@ -348,10 +394,46 @@ def regulator_of(
     return family, found, column_of(chosen, chosen.z)
 
 
+def further_regulator(
+    problem: Problem, family: Any, blocks: Blocks, base: Candidate, limit: Cause, causes: Causes
+) -> tuple[Any, Mapping[str, float]] | None:
+    """Return a family with another kind of regulator, if pressures need one, and its values.
+
+    The pressures are those of the fitted motion, which changes the volume of the muscles.
+    """
+    pressures = [c.startswith("pressure") for c in family.channels]
+    if family.measured_drive or LAG not in {f.name for f in family.base()}:
+        return None
+    if np.max(blocks.means(base.errors)[pressures], initial=0.0) < FITS:
+        return None
+    plant = family.plant_of(column_of(base.fit, base.fit.z))
+    moved = dataclasses.replace(family, plant=plant)
+    found, fit = Selection(problem, moved, blocks, limit, causes, lambda _: {}).kind()
+    changed = {
+        n: found.plant.value(n) for n in plant.names if found.plant.value(n) != plant.value(n)
+    }
+    if not changed:
+        return None
+    made = family.plant.replace_with_substeps(changed)
+    return dataclasses.replace(family, plant=made), fit.values()
+
+
 def calibrate_compiled(
-    family: Any, measured: Array, noise: Array, blocks: Blocks, time: Array, shapes: Array
+    family: Any,
+    measured: Array,
+    noise: Array,
+    blocks: Blocks,
+    time: Array,
+    shapes: Array,
+    limit: Cause | None = None,
+    causes: Causes = (),
 ) -> Calibration:
-    """Fit the base of a plant: the regulator to the pressures alone, then all parameters."""
+    """Fit the base of a plant: the regulator to the pressures alone, then all parameters.
+
+    ``limit`` is the cause of a rate limit; of the other ``causes``, those that act on the pressures
+    are tried in the selection of another kind of regulator, where the base lacks it. There is none
+    without a limit.
+    """
     family = family.spanning(measured)
     problem = Problem(
         *(family.simulate, measured, noise, blocks.train, time, family.tie, shapes),
@@ -359,9 +441,25 @@ def calibrate_compiled(
         checks=family.checks,
     )
     family, found, column = regulator_of(problem, family, blocks)
-    problem = dataclasses.replace(
-        problem, simulate=family.simulate, tie=family.tie, violations=family.violations
-    )
+    made = fitted(problem, family, blocks, found, column)
+    other = None
+    if limit is not None:
+        other = further_regulator(made.problem, family, blocks, made.base, limit, causes)
+    if other is None:
+        return made
+    again, valve = other
+    known = made.base.fit.values() | dict(valve)
+    column = column_with(again, {f.name: known[f.name] for f in again.base() if f.name in known})
+    better = fitted(problem, again, blocks, known, column)
+    return better if blocks.gain(made.base.errors, better.base.errors) > 0.0 else made
+
+
+def fitted(
+    problem: Problem, family: Any, blocks: Blocks, found: Mapping[str, float], column: Array
+) -> Calibration:
+    """Fit all base parameters, from values of the regulator and the column with them."""
+    measured, noise = problem.measured, problem.noise
+    problem = replayed_by(family, problem)
     law, wide = family.guesses(measured, noise, column)
     usual = start_at_guess(family.base(), dict(found))
     starts = [tuple(free for free in usual if free.name not in family.last)]

@@ -55,6 +55,8 @@ FORGOTTEN, FIRST = 0.2, 5
 of readings of the rest at the start."""
 RANGE = "map_pressure", "map_least", "map_strain"
 """Parameters of the range of a correction."""
+LIMIT = "slew_limit"
+"""Cause of a rate limit, which the lags of a regulator may have."""
 DRIVE_GAIN = 0.1
 """Gain on held-out blocks from which the friction of a base has the other drive: a tenth less of
 the mean square, beyond what the draw of the blocks changes."""
@@ -384,7 +386,10 @@ class RegulatedKind:
             measured = measured.copy()
             inputs = set(self.pairs_of(family.plant).values())
             measured[[c in inputs for c in family.channels]] = np.nan  # inputs are no outputs
-        data = measured, noise, blocks, time, shapes
+        every = self.causes(self.catalogue)
+        limit = next(cause for cause in every if cause.name == LIMIT)
+        others = [cause for cause in every if not cause.common]
+        data = measured, noise, blocks, time, shapes, limit, others
         found, rival = calibrate_compiled(family, *data), self.rival(family.plant)
         if rival is None:
             return found

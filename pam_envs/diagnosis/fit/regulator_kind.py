@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.arrays import Array
+from pam_envs.arrays import Array, Flags
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import frees_for, restarted
@@ -38,10 +38,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
     SECOND_ORDER,
     SPEEDS,
     STAGES,
-    MuscleFamily,
 )
-from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.flow import AIRS, REPLACED, SWITCH
 
 FINE_STEP = 0.0101
@@ -67,14 +64,12 @@ TAIL_FREQUENCIES, TAIL_FASTEST = (0.6, 1.0), 2.0
 """Frequencies [Hz] at which a fit of that share starts, and the largest one."""
 DELAY, LEAK = 0.02, 0.005
 """Dead time [s] and leak [1/s] at which a fit starts."""
-CONDUCTANCES = (1e-10, 8e-10)
-"""Conductances [m3/(s Pa)] at which a fit starts."""
 INTEGRALS, RELEASES = (10.0, 40.0), (0.1, 0.5)
 """Gain [1/s2] and release time [s] of an integral part at which a fit starts."""
 CHARACTERISTICS = ((0.95, 0.9, 0.8, 0.6), (0.7, 0.5, 0.3, 0.15), (1.3, 1.6, 1.8, 1.9))
 """Values of :data:`SPEEDS` at which a fit starts."""
 
-Made = tuple[MuscleFamily, Fit]
+Made = tuple[Any, Fit]
 """A family with a kind of regulator, and its fit; a kind that cannot be tried gives None."""
 
 
@@ -83,14 +78,14 @@ class Selection:
     """Fits of the kinds of regulator of a family to the pressure alone."""
 
     problem: Problem
-    family: MuscleFamily
+    family: Any
     blocks: Blocks
     limit: Cause  # a limited rate, which the lags may have
     causes: Sequence[Cause]  # others that may act on the pressure, or on its reading
     # gives parameters of the static law, with which orifices fill the volume of the muscle
-    law: Callable[[MuscleFamily], Mapping[str, float]]
+    law: Callable[[Any], Mapping[str, float]]
 
-    def selected(self) -> tuple[MuscleFamily, Fit, dict[str, Form]]:
+    def selected(self) -> tuple[Any, Fit, dict[str, Form]]:
         """Return the family with the regulator that the pressure needs, its fit, and effects.
 
         The regulator is a lag of first or second order or, if that is not sufficient, one of four
@@ -101,7 +96,7 @@ class Selection:
         family, fit = self.kind()
         return family, *self.of(family).with_shown_effects(fit)
 
-    def kind(self) -> tuple[MuscleFamily, Fit]:
+    def kind(self) -> tuple[Any, Fit]:
         """Return the family with the selected regulator, and its fit with the effects aside."""
         family, fit = self.lags()
         if not self.lacks(fit):
@@ -123,7 +118,7 @@ class Selection:
                 best, reached = made, made[1]
         return best
 
-    def lags(self) -> tuple[MuscleFamily, Fit]:
+    def lags(self) -> tuple[Any, Fit]:
         """Return the family with a lag of first or second order and its fit."""
         family = self.family
         lag = (*regulator_of(family), *self.aside(family))
@@ -144,7 +139,7 @@ class Selection:
         chosen = self.simplest([*sorted(again, key=_size), chosen], LONG_ROUNDS)
         return with_values(family, chosen, STAGES), chosen
 
-    def aside(self, family: MuscleFamily) -> tuple[Free, ...]:
+    def aside(self, family: Any) -> tuple[Free, ...]:
         """Return effects that are free while a kind is selected, unless the base holds them.
 
         The leak is free only if the valve is shut in some samples.
@@ -152,7 +147,7 @@ class Selection:
         starts = {"regulator.dead_time": {"start": DELAY}}
         if family.plant.air != "flow":
             starts["regulator.exhaust_ratio"] = {"start": 1.0, "log": True}
-        if is_shut(family):
+        if family.is_shut:
             starts["regulator.leak"] = {"start": LEAK, "scale": LEAK}
         known = {free.name for free in family.base()}
         return tuple(family.free(n, **given) for n, given in starts.items() if n not in known)
@@ -192,7 +187,7 @@ class Selection:
         return (
             all(name.startswith(PRESSURE) for name in names)
             and not names & self.family.plant.inert
-            and ("regulator.leak" not in names or is_shut(self.family))
+            and ("regulator.leak" not in names or self.family.is_shut)
         )
 
     def with_one_effect(self, fit: Fit) -> Fit:
@@ -258,7 +253,7 @@ class Selection:
                     fit, terms = less, tuple(t for t in terms if t is not term)
         return fit, dataclasses.replace(form, terms=terms)
 
-    def slow_tail(self, family: MuscleFamily, fit: Fit) -> Made | None:
+    def slow_tail(self, family: Any, fit: Fit) -> Made | None:
         """Return the lag with a share of the pressure that follows slowly.
 
         Air that flows into dead volumes, or an integrating pilot, gives such a tail.
@@ -269,7 +264,7 @@ class Selection:
         overdamped = {"regulator.ring_damping": TAIL_DAMPING}
         other = dataclasses.replace(family, plant=plant.replace(overdamped))
         column = column_of(fit, fit.z)
-        column[R.place("regulator.ring_damping")] = TAIL_DAMPING
+        column[other.free("regulator.ring_damping").place] = TAIL_DAMPING
         frees = start_at_guess(fit.frees, fit.values())
         share = other.free(TAIL, start=0.05, high=0.5, scale=0.02)
         fits = []
@@ -279,7 +274,7 @@ class Selection:
         made = self.simplest(fits)
         return with_values(other, made, (TAIL, TAIL_FREQUENCY)), made
 
-    def characteristic(self, family: MuscleFamily, fit: Fit) -> Made | None:
+    def characteristic(self, family: Any, fit: Fit) -> Made | None:
         """Return the lag, of first or second order, whose rate is not proportional to the error."""
         plant = family.plant
         if plant.air == "flow" or any(plant.value(n) != plant.neutral[n] for n in SPEEDS):
@@ -295,7 +290,7 @@ class Selection:
         made = self.of(other).simplest(fits, LONG_ROUNDS)
         return with_values(other, made, (*SPEEDS, *STAGES)), made
 
-    def integral(self, family: MuscleFamily, fit: Fit) -> Made | None:
+    def integral(self, family: Any, fit: Fit) -> Made | None:
         """Return the lag with a controller that also has an integral part."""
         plant = family.plant
         if plant.air == "flow" or plant.regulator.integral != 0.0:
@@ -310,34 +305,39 @@ class Selection:
         made = self.of(other).simplest(fits, LONG_ROUNDS)
         return with_values(other, made, INTEGRAL), made
 
-    def orifices(self, family: MuscleFamily, fit: Fit) -> Made | None:
+    def orifices(self, family: Any, fit: Fit) -> Made | None:
         """Return the plant with flow through orifices.
 
         The muscle, whose volume is filled, is that of the family or one with another law.
         """
         if not can_flow(self.family):
             return None
-        other = dataclasses.replace(family, plant=orifices_of(family.plant)).finer(FINE_STEP)
+        other = dataclasses.replace(family, plant=orifices_of(family)).finer(FINE_STEP)
         law = self.law(family)
         full = family.plant.regulator.max_pressure
         columns = [other.column, column_with(other, law)] if law else [other.column]
         fits = []
-        for size, source in product(CONDUCTANCES, (1.05 * full, 1.5 * full)):
+        for size, source in product(family.conductances, (1.05 * full, 1.5 * full)):
             begin = {"regulator.conductance": size, "regulator.source_pressure": source}
             frees = start_at_guess((*regulator_of(other), *self.aside(other)), begin)
             fits += [Fit.at_start(frees, column) for column in columns]
         of = self.of(other)
         return other, of.simplest(promising(of.only, fits), LONG_ROUNDS)
 
-    def of(self, family: MuscleFamily) -> "Selection":
+    def of(self, family: Any) -> "Selection":
         """Return the selection with the simulation of another family."""
         return dataclasses.replace(self, family=family)
 
     @cached_property
+    def pressures(self) -> Flags:
+        """Whether each channel is a pressure that was recorded, (channels,)."""
+        named = [channel.startswith("pressure") for channel in self.family.channels]
+        return np.array(named) & np.isfinite(self.problem.measured).any(axis=1)
+
+    @cached_property
     def only(self) -> Problem:
         """The problem of fitting the pressure alone."""
-        alone = self.problem.measured.copy()
-        alone[0] = np.nan
+        alone = np.where(self.pressures[:, None], self.problem.measured, np.nan)
         return dataclasses.replace(
             self.problem,
             measured=alone,
@@ -348,9 +348,9 @@ class Selection:
         )
 
     def left(self, fit: Fit) -> float:
-        """Return the mean square of the pressure's residual over its noise."""
+        """Return the mean square of the residual over the noise, of the worst pressure."""
         errors = self.blocks.errors(self.only.rows(fit.residual))
-        return float(self.blocks.means(errors)[1])
+        return float(np.max(self.blocks.means(errors)[self.pressures]))
 
     def lacks(self, fit: Fit) -> bool:
         """Return whether a regulator leaves more of the pressure than noise."""
@@ -370,12 +370,7 @@ def _size(fit: Fit) -> int:
     return len(fit.frees)
 
 
-def is_shut(family: MuscleFamily) -> bool:
-    """Return whether the valve is shut in some samples."""
-    return bool(np.any(family.inputs.command < 0.0))
-
-
-def regulator_of(family: MuscleFamily) -> tuple[Free, ...]:
+def regulator_of(family: Any) -> tuple[Free, ...]:
     """Return the free parameters of the regulator and the clock."""
     every = family.base()
     return tuple(f for f in every if f.name.startswith("regulator.") or f.name in (BORE, CLOCK))
@@ -394,7 +389,7 @@ def second_orders(family: Any, frees: tuple[Free, ...]) -> list[tuple[Free, ...]
     ]
 
 
-def with_values(family: MuscleFamily, fit: Fit, names: Collection[str]) -> MuscleFamily:
+def with_values(family: Any, fit: Fit, names: Collection[str]) -> Any:
     """Return the family whose plant has some parameters of a fit, as far as they are free in it."""
     values = {name: value for name, value in fit.values().items() if name in names}
     return dataclasses.replace(family, plant=family.plant.replace(values)) if values else family
@@ -415,7 +410,7 @@ def simplest(problem: Problem, blocks: Blocks, fits: list[Fit], rounds: int = GU
     return fits[chosen]
 
 
-def column_with(family: MuscleFamily, law: Mapping[str, float]) -> Array:
+def column_with(family: Any, law: Mapping[str, float]) -> Array:
     """Return the column of a family with some parameters, within their bounds."""
     column = family.column
     for name, value in law.items():
@@ -425,25 +420,24 @@ def column_with(family: MuscleFamily, law: Mapping[str, float]) -> Array:
     return column
 
 
-def can_flow(family: MuscleFamily) -> bool:
+def can_flow(family: Any) -> bool:
     """Return whether flow through orifices may replace the regulator of a family's plant."""
     plant = family.plant
+    free = {f.name for f in family.base()} | STAGES
+    effects = [n for n in (f"regulator.{name}" for name in REPLACED) if n in plant.neutral]
     return (
         plant.air != "flow"
         and not plant.flowless
-        and all(
-            plant.value(f"regulator.{name}") == plant.neutral[f"regulator.{name}"]
-            for name in REPLACED
-            if f"regulator.{name}" in plant.neutral and f"regulator.{name}" not in STAGES
-        )
+        and all(plant.value(n) == plant.neutral[n] for n in effects if n not in free)
     )
 
 
-def orifices_of(plant: SingleMuscle) -> SingleMuscle:
-    """Return a plant with flow through orifices at their starting values, of first order."""
+def orifices_of(family: Any) -> Any:
+    """Return a family's plant with flow through orifices at their starting values."""
+    plant = family.plant
     source = max(ORIFICES["regulator.source_pressure"], 1.2 * plant.regulator.max_pressure)
     first_order = {name: plant.neutral[name] for name in STAGES & set(plant.neutral)}
-    values = {**ORIFICES, "regulator.source_pressure": source, **first_order}
+    values = {**family.orifices, "regulator.source_pressure": source, **first_order}
     return plant.replace_with_substeps({**values, SWITCH: float(AIRS.index("flow"))})
 
 

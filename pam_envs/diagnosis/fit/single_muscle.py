@@ -96,6 +96,8 @@ ORIFICES = {
     "regulator.source_pressure": 8e5,
 }
 """Parameters of a regulator with flow through its orifices, with their starting values."""
+CONDUCTANCES = (1e-10, 8e-10)
+"""Conductances [m3/(s Pa)] at which a fit starts."""
 SOURCE, LEAST_SOURCE = "regulator.source_pressure", 1.001
 """Pressure of the supply, and the least one over the largest setpoint."""
 LAG = "regulator.time_constant"
@@ -153,6 +155,8 @@ class MuscleFamily:
     fallback_noise = (5e-5, 1e3)
     scales = (1e-3, 1e5)
     units = ("mm", "bar")
+    orifices = ORIFICES
+    conductances = CONDUCTANCES
 
     def finer(self, step: float) -> "MuscleFamily":
         """Return the family with another longest sub-step of the simulation [s]."""
@@ -162,6 +166,11 @@ class MuscleFamily:
     def column(self) -> Array:
         """Parameters of the plant and the offset of the clock, shape (p + 1,)."""
         return np.append(self.plant.parameter_rows(), 0.0)
+
+    @property
+    def is_shut(self) -> bool:
+        """Whether the valve is shut in some samples."""
+        return bool(np.any(self.inputs.command < 0.0))
 
     @property
     def lead(self) -> int:
