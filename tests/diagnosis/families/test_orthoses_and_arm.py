@@ -11,6 +11,8 @@ from pam_envs.data.recording.channels import WIRINGS, wiring_of
 from pam_envs.data.recording.recording import Recording, RecordingError, load_recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import diagnose
+from pam_envs.diagnosis.audit.noise import noise_floor
+from pam_envs.diagnosis.diagnosis import Study
 from pam_envs.diagnosis.families.kinds import KINDS, kind_named
 from pam_envs.plants.core.replay import replay_plant
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
@@ -121,6 +123,25 @@ def test_only_muscles_in_pairs_have_a_fault_among_their_common_differences():
     pairs = {"antagonistic_joint", "redundant_manipulator"}
     assert {name for name, faults in found.items() if faults} == pairs
     assert set.union(*found.values()) == {"unequal_muscles"}
+
+
+@needs_kernels
+@pytest.mark.parametrize("flow", [0.0, 1.0])
+def test_regulator_of_the_base_is_of_the_kind_that_the_pressure_shows(flow):
+    rig, kind = family_rigs.KNEE, kind_named("knee_orthosis")
+    recording, sheet = rig.recorded(regulator__flow=flow), rig.sheet
+    floor = noise_floor(recording, sheet)
+    study = Study.begin(recording, sheet, kind.start(sheet), floor, kind)
+    assert study.family.plant.air == ("flow" if flow else "regulator")
+    left = study.blocks.means(study.base.errors)
+    assert left[study.family.channels.index("pressure")] < 1.1
+    found, true = study.plant_of(study.base).regulator, rig.truth(regulator__flow=flow).regulator
+    if flow:
+        assert found.conductance == pytest.approx(true.conductance, rel=0.02)
+        assert found.exhaust_share == pytest.approx(true.exhaust_share, rel=0.02)
+        assert found.source_pressure == pytest.approx(true.source_pressure, rel=0.02)
+    else:
+        assert found.time_constant == pytest.approx(true.time_constant, rel=0.05)
 
 
 @pytest.mark.parametrize("name", KINDS)
