@@ -19,7 +19,9 @@ from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of, 
 from pam_envs.diagnosis.fit.single_muscle import clock_of
 
 SHIFT = 0.5
-"""Step of the offsets of the clock [rows] that a refit absorbs."""
+"""Step of the offsets of the clock [rows], of which a refit has one."""
+RANK = 1e-6
+"""Relative size of the singular directions, squared, that count."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,9 @@ class Absorbed:
     """Changes of the readings, in vectors of residuals, that a refit of a base can make."""
 
     problem: Problem
-    always: Array  # by base, offsets of each channel, settling and clock, shape (k, m)
+    always: Array  # by base, offsets of each channel, and settling, shape (k, m)
     differences: Mapping[str, Array]  # by common differences that the clean rig does not need
+    shifts: Sequence[Array] = ()  # by offsets of the clock, each (m,)
     bases: dict[str, Array] = field(default_factory=dict)  # orthonormal, by hidden effect
 
     @classmethod
@@ -39,18 +42,31 @@ class Absorbed:
         """
         problem, made = study.problem, [base_subspace(study.normal.fit)]
         made += [problem.vectors(rows.reshape(1, -1)) for rows in _offsets(problem)]
-        made += [problem.vectors(rows.reshape(1, -1)) for rows in _shifts(study, outputs)]
-        return cls(problem, np.vstack(made), dict(_differences(study, causes)))
+        moved = [problem.vectors(rows.reshape(1, -1))[0] for rows in _shifts(study, outputs)]
+        return cls(problem, np.vstack(made), dict(_differences(study, causes)), moved)
 
     def left(self, rows: Array, name: str = "") -> Array:
-        """Return what is left of a trace over the noise (channels, T) of a hidden effect."""
+        """Return what is left of a trace over the noise (channels, T) of a hidden effect.
+
+        It is the least that remains with one of the offsets of the clock, or with none.
+        """
         basis = self.bases.get(name)
         if basis is None:
             more = [found for cause, found in self.differences.items() if cause != name]
-            stacked = np.vstack([self.always, *more])
-            basis = self.bases[name] = np.asarray(np.linalg.qr(stacked.T)[0].T)
-        whole = self.problem.vectors(rows.reshape(1, -1))
-        return self.problem.rows(projected(whole, basis)[0])
+            basis = self.bases[name] = orthonormal(np.vstack([self.always, *more]))
+        whole = self.problem.vectors(rows.reshape(1, -1))[0]
+        tried = np.array([whole, *(whole - moved for moved in self.shifts)])
+        left = projected(tried, basis)
+        return self.problem.rows(left[int(np.argmin(np.einsum("ki,ki->k", left, left)))])
+
+
+def orthonormal(rows: Array) -> Array:
+    """Return an orthonormal basis of the span of rows (n, m), shape (rank, m)."""
+    sizes = np.linalg.norm(rows, axis=1)
+    scaled = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
+    values, vectors = np.linalg.eigh(scaled @ scaled.T)
+    kept = values > RANK * values[-1]
+    return np.asarray((vectors[:, kept].T @ scaled) / np.sqrt(values[kept])[:, None])
 
 
 def _offsets(problem: Problem) -> Iterator[Array]:

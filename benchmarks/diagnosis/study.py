@@ -44,7 +44,8 @@ def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
         spent["runtime_s"] = clock.perf_counter() - started
         record |= outcome(found) | {"traces": trace_errors(made, found)}
         record["nature"] = deserved(made.ground.base)
-        if any(c["name"] == BENT and c["form"] != "pressure" for c in found.report["causes"]):
+        models = (found.study.model, *found.study.decision.open_rivals)
+        if any(c.name == BENT and f.name != "pressure" for m in models for c, f in m.causes):
             record["nature"] = [name for name in record["nature"] if name != BENT]
         if "loop" in stages and loops(case):
             record["loop"] = loop_of(made, found)

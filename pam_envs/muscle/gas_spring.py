@@ -14,18 +14,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
-from pam_envs.muscle.effects import TemperatureEffects, ViscosityEffects
+from pam_envs.muscle.effects import LengthYieldTailEffects, TemperatureEffects, ViscosityEffects
 from pam_envs.muscle.law_correction import FIELDS, LawCorrection
-from pam_envs.parameters import assumed, derived
+from pam_envs.parameters import assumed, declarations, derived
 
 
 @dataclass(frozen=True)
-class GasSpring(LawCorrection, ViscosityEffects, TemperatureEffects):
+class GasSpring(LawCorrection, LengthYieldTailEffects, ViscosityEffects, TemperatureEffects):
     """The muscle of the orthosis; inverses of its law do not use the correction."""
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
         *TemperatureEffects.effects,
         *ViscosityEffects.effects,
+        tuple(declarations(LengthYieldTailEffects)),
         FIELDS,
     )
 

@@ -217,7 +217,8 @@ def test_refit_absorbs_what_other_differences_of_the_base_can_make():
 
     rng = np.random.default_rng(3)
     base, friction, own = rng.normal(size=(3, 80))
-    found = Absorbed(Flat(), base[None], {"hysteresis_drive": friction[None]})
+    twice = np.stack([friction, friction, np.zeros(80)])  # spans one direction
+    found = Absorbed(Flat(), base[None], {"hysteresis_drive": twice})
     trace = 2.0 * base + 3.0 * friction + own
     both = found.left(trace.reshape(2, -1), "stick_slip").ravel()
     alone = found.left(trace.reshape(2, -1), "hysteresis_drive").ravel()
@@ -225,3 +226,23 @@ def test_refit_absorbs_what_other_differences_of_the_base_can_make():
     assert both @ friction == pytest.approx(0.0, abs=1e-9)
     assert alone @ base == pytest.approx(0.0, abs=1e-9)
     assert abs(alone @ friction) > 3.0
+
+
+def test_refit_absorbs_one_offset_of_the_clock():
+    from benchmarks.diagnosis.absorbed import Absorbed
+
+    rng = np.random.default_rng(4)
+    base, early, late = rng.normal(size=(3, 80))
+    found = Absorbed(Flat(), base[None], {}, [early, late])
+    assert np.abs(found.left((late + 2.0 * base).reshape(2, -1))).max() < 1e-9
+    both = found.left((early + late).reshape(2, -1)).ravel()
+    assert np.linalg.norm(both) > 0.8 * min(np.linalg.norm(early), np.linalg.norm(late))
+
+
+def test_directions_without_length_and_equal_ones_span_nothing_more():
+    from benchmarks.diagnosis.absorbed import orthonormal
+
+    rows = np.random.default_rng(5).normal(size=(3, 50))
+    basis = orthonormal(np.vstack([rows, 1e-6 * rows[:2], np.zeros((4, 50))]))
+    assert basis.shape == (3, 50)
+    assert basis @ basis.T == pytest.approx(np.eye(3), abs=1e-9)

@@ -302,14 +302,20 @@ class FlexibleBase:
     def with_fault_alone(self, chosen: Sequence[tuple[Cause, Form]], model: Candidate) -> Candidate:
         """Return a model, or a smaller one whose only difference is a fault, if it is sufficient.
 
-        Beside a large fault, a fit with every difference may end far from one with that alone, and
-        refits without one of the others do not leave its valley.
+        It is sufficient if it is as good as the model with every difference, and better than that
+        without the fault. Beside a large fault, a fit with every difference may end far from one
+        with that alone, and refits without one of the others do not leave its valley.
         """
+        least = self.rule.least_gain
         for cause, form in chosen:
-            if not (cause.by_nature or cause.lawlike or cause.name in self.shown):
-                alone = self.fitted([(cause, form)])
-                if self.loss(alone, model) <= 0.0:
-                    return alone
+            if cause.by_nature or cause.lawlike or cause.name in self.shown:
+                continue
+            alone = self.fitted([(cause, form)])
+            if self.blocks.gain(alone.errors, model.errors) > least:
+                continue
+            others = self.fitted([other for other in chosen if other[0] is not cause])
+            if self.blocks.gain(others.errors, alone.errors) > least:
+                return alone
         return model
 
     def anchored(self, model: Candidate) -> Candidate:

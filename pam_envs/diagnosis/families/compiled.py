@@ -27,6 +27,7 @@ from pam_envs.diagnosis.fit.least_squares import (
 )
 from pam_envs.diagnosis.fit.regulator_kind import (
     FITS,
+    ORDER_GAIN,
     Selection,
     column_with,
     second_orders,
@@ -276,13 +277,13 @@ class CompiledFamily(UsualStart):
         """Return the base parameters, with those of effects that the plant already has."""
         plant, inert = self.plant, self.plant.inert
         names = [n for n in self.settings if not (self.measured_drive and in_valve(n))]
-        names = [n for n in names if n not in inert]
         if not self.measured_drive:
             names += stages_of(plant)
             names += (
                 INTEGRAL if INTEGRAL[0] in plant.names and plant.value(INTEGRAL[0]) > 0.0 else ()
             )
             names += ORIFICES if plant.air == "flow" else ()
+        names = [name for name in names if name not in inert]
         names += [CLOCK] if self.lead else []
         names += [f"{WEIGHT}{k}]" for k in range(self.elements)]
         present = [
@@ -412,7 +413,7 @@ def further_regulator(
     changed = {
         n: found.plant.value(n) for n in plant.names if found.plant.value(n) != plant.value(n)
     }
-    if not changed:
+    if set(changed) <= STAGES:  # no other kind than the base's
         return None
     made = family.plant.replace_with_substeps(changed)
     return dataclasses.replace(family, plant=made), fit.values()
@@ -450,8 +451,8 @@ def calibrate_compiled(
     again, valve = other
     known = made.base.fit.values() | dict(valve)
     column = column_with(again, {f.name: known[f.name] for f in again.base() if f.name in known})
-    better = fitted(problem, again, blocks, known, column)
-    return better if blocks.gain(made.base.errors, better.base.errors) > 0.0 else made
+    better = fitted(problem, again, blocks, valve, column)
+    return better if blocks.gain(made.base.errors, better.base.errors) > ORDER_GAIN else made
 
 
 def fitted(

@@ -17,7 +17,7 @@ from pam_envs.arrays import Array
 from pam_envs.constants import BAR
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis.families.adapted import with_bearing, with_correction
+from pam_envs.diagnosis.families.adapted import with_bearing, with_correction, with_yielding
 from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
 from pam_envs.diagnosis.fit.least_squares import Free
@@ -28,6 +28,7 @@ from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.hysteresis import (
     FULL_PRESSURE,
     FULL_STIFFNESS,
+    REFERENCE_PRESSURE,
     knee_hysteresis,
 )
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -59,6 +60,8 @@ FACTORS = {
 """Usual sizes over those of a muscle, by their units: a lever of 80 mm, and 5 N for 1 mm."""
 BREAKS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 """Breakaway torques [N m] at which the search for a sticking bearing begins."""
+LEAST_FORCE = 0.1
+"""Least yielding friction [N] without pressure, where a fit starts."""
 MOVING = "no_load"
 USUAL_STRETCH = 0.2
 """Stretch of the muscle over its length at which a slope of the law by pressure is usual."""
@@ -129,6 +132,24 @@ class BoundKnee(RegulatedFamily):
         stretch = np.maximum(0.0, full * (1.0 - strain) - value("shortest_length"))
         return slope * full * pressure, slope * stretch, slope * full * USUAL_STRETCH
 
+    def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
+        """Return starting values at which friction driven by length yields smoothly."""
+        names = [name for name in found if name.startswith(WEIGHT)]
+        thresholds = getattr(self.plant.hysteresis.operator, "thresholds", ())
+        weights = np.array([found[name] for name in names])
+        if not names or weights.sum() <= 0.0:
+            return dict(found)
+        away = float(weights @ np.array(thresholds))  # [1], over the stiffness of the friction
+        slip, empty = found["hysteresis.friction"] * away, found["hysteresis.empty"]
+        return {
+            **found,
+            **dict.fromkeys(names, 0.0),
+            "muscle.yield_force": max(LEAST_FORCE, empty * slip),
+            "muscle.yield_per_pressure": (1.0 - empty) * slip / REFERENCE_PRESSURE,
+            "muscle.yield_break": away / float(weights.sum()) / self.plant.lever.full_length,
+            "muscle.yield_ratio": 0.5,
+        }
+
     def signals(self, recording: Recording, outputs: Array) -> Signals:
         """Return the angle, or the tension at a held length, and the pressure."""
         (command,) = self.setpoints(recording)
@@ -147,7 +168,7 @@ class KneeKind(RegulatedKind):
     renamed = ({"position": "angle", "mass": "lever"}, {"position": "tension", "mass": "lever"})
     factors = FACTORS
     titles: ClassVar[Mapping[str, str]] = {"sensor_delay": "the delay of a sensor"}
-    catalogue = with_correction(with_bearing("lever", BREAKS), "muscle", CORRECTED)
+    catalogue = with_yielding(with_correction(with_bearing("lever", BREAKS), "muscle", CORRECTED))
 
     def preset(self) -> KneeOrthosis:
         """Return the brace alone."""

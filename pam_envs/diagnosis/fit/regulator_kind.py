@@ -113,7 +113,7 @@ class Selection:
             if not self.lacks(reached):
                 break
             made = kind(family, fit)
-            enough = min(least, ENOUGH * float(np.log(self.left(reached))))
+            enough = min(least, ENOUGH * self.possible(reached))
             if made is not None and self.gain(reached, made[1]) >= enough:
                 best, reached = made, made[1]
         return best
@@ -347,14 +347,18 @@ class Selection:
             checks=0,
         )
 
-    def left(self, fit: Fit) -> float:
-        """Return the mean square of the residual over the noise, of the worst pressure."""
+    def left(self, fit: Fit) -> Array:
+        """Return the mean squares of the pressures' residuals over their noise, (pressures,)."""
         errors = self.blocks.errors(self.only.rows(fit.residual))
-        return float(np.max(self.blocks.means(errors)[self.pressures]))
+        return np.asarray(self.blocks.means(errors)[self.pressures])
 
     def lacks(self, fit: Fit) -> bool:
-        """Return whether a regulator leaves more of the pressure than noise."""
-        return self.left(fit) >= FITS
+        """Return whether a regulator leaves more of a pressure than noise."""
+        return bool(self.left(fit).max() >= FITS)
+
+    def possible(self, fit: Fit) -> float:
+        """Return the gain over a fit of one that leaves only noise."""
+        return float(np.log(np.maximum(1.0, self.left(fit))).sum())
 
     def gain(self, before: Fit, after: Fit) -> float:
         """Return the gain of a fit over another one."""
@@ -423,12 +427,11 @@ def column_with(family: Any, law: Mapping[str, float]) -> Array:
 def can_flow(family: Any) -> bool:
     """Return whether flow through orifices may replace the regulator of a family's plant."""
     plant = family.plant
-    free = {f.name for f in family.base()} | STAGES
-    effects = [n for n in (f"regulator.{name}" for name in REPLACED) if n in plant.neutral]
+    effects = {f"regulator.{name}" for name in REPLACED} & set(plant.neutral)
     return (
         plant.air != "flow"
         and not plant.flowless
-        and all(plant.value(n) == plant.neutral[n] for n in effects if n not in free)
+        and all(plant.value(n) == plant.neutral[n] for n in effects - STAGES)
     )
 
 

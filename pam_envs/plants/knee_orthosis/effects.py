@@ -2,17 +2,18 @@
 
 The muscle has the effects of its path (those of the air only behind the regulator's lag); the
 hysteresis turns the effective pressure into stiffness, and a correction of the law depends on
-effective pressure and length. A viscous force resists its contraction. The bearing of the brace
-without a leg sticks and slips, and all sensors have their effects.
+effective pressure and length. Yielding friction and a viscous force resist its contraction. The
+bearing of the brace without a leg sticks and slips, and all sensors have their effects.
 """
 
 from typing import Any
 
 from pam_envs.constants import DENSITY_PER_PRESSURE
-from pam_envs.kernels.arithmetic import sine_and_cosine
+from pam_envs.kernels.arithmetic import count_on, sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, scratch
+from pam_envs.kernels.yielding import deflected_with_tail
 from pam_envs.mechanics.knee_lever import muscle_length
-from pam_envs.muscle.effects import taut_damping
+from pam_envs.muscle.effects import taut_damping, yield_spring
 from pam_envs.muscle.gas_spring import gas_volume, stretch_of
 from pam_envs.muscle.law_correction import correction_force, correction_slope
 from pam_envs.plants.core.muscle_path import (
@@ -117,7 +118,10 @@ def enclose_air(rows: Any, fixed: Any, j: int, angle: float, ahead: float) -> No
 
 @kernel
 def settle_air(rows: Any, fixed: Any, h: float, work: Any) -> None:
-    """Move the enclosed air of a tile with the motion, where air flows."""
+    """Move yielding friction and, where air flows, the enclosed air of a tile with the motion."""
+    if count_on(fixed[K.MUSCLE_YIELD_FORCE], 0.0) > 0:
+        for j in range(LANES):
+            move_yield(rows, fixed, j, angle_ahead(rows, fixed, j, 0.0, work))
     if flows_on(fixed, K.EFFECT.path) == 0:
         return
     for j in range(LANES):
@@ -129,7 +133,8 @@ def settle_air(rows: Any, fixed: Any, h: float, work: Any) -> None:
 
 @kernel
 def begin_enclosed(rows: Any, fixed: Any, j: int) -> None:
-    """Begin the enclosed air of the muscle of lane ``j`` at its angle."""
+    """Begin yielding friction and enclosed air of the muscle of lane ``j`` at its angle."""
+    move_yield(rows, fixed, j, rows[K.ANGLE][j])
     enclose_air(rows, fixed, j, rows[K.ANGLE][j], 0.0)
 
 
@@ -152,18 +157,52 @@ def drive_of(rows: Any, j: int) -> float:
 
 
 @kernel
-def corrected_tension(rows: Any, fixed: Any, j: int, length: float) -> float:
-    """Return the tension [N] of the law's correction at a length [m]."""
-    strain = 1.0 - length / full_length(fixed, j)
-    return correction_force(fixed, j, K.EFFECT.law, drive_of(rows, j), strain)  # type: ignore[no-any-return]
+def yield_at(rows: Any, fixed: Any, j: int, strain: float) -> tuple[float, float, float]:
+    """Return stiffness by strain [N], deflection and its slope of the yielding friction.
+
+    At a strain of the muscle of lane ``j``, from where the friction was last.
+    """
+    stiff, limit = yield_spring(fixed, j, K.EFFECT.soft, drive_of(rows, j))
+    deflection, slope = deflected_with_tail(
+        rows[EFFECTS_AT + K.STATE.deflection][j],
+        strain - rows[EFFECTS_AT + K.STATE.yielded][j],
+        limit, fixed[K.MUSCLE_YIELD_RATIO][j], fixed[K.MUSCLE_YIELD_TAIL][j],
+    )  # fmt: skip
+    return stiff, deflection, slope
 
 
 @kernel
-def corrected_stiffness(rows: Any, fixed: Any, j: int, length: float) -> float:
-    """Return the derivative of :func:`corrected_tension` by length [N/m]."""
+def move_yield(rows: Any, fixed: Any, j: int, angle: float) -> None:
+    """Move the yielding friction of the muscle of lane ``j`` to an angle [rad]."""
+    if fixed[K.MUSCLE_YIELD_FORCE][j] > 0.0:
+        sine, _ = sine_and_cosine(0.5 * angle)
+        length = muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
+        strain = 1.0 - length / full_length(fixed, j)
+        _, rows[EFFECTS_AT + K.STATE.deflection][j], _ = yield_at(rows, fixed, j, strain)
+        rows[EFFECTS_AT + K.STATE.yielded][j] = strain
+
+
+@kernel
+def further_tension(rows: Any, fixed: Any, j: int, length: float) -> float:
+    """Return the tension [N] of the law's correction and of yielding friction at a length [m]."""
+    strain = 1.0 - length / full_length(fixed, j)
+    more = correction_force(fixed, j, K.EFFECT.law, drive_of(rows, j), strain)
+    if fixed[K.MUSCLE_YIELD_FORCE][j] > 0.0:
+        stiff, deflection, _ = yield_at(rows, fixed, j, strain)
+        more = more - stiff * deflection
+    return more  # type: ignore[no-any-return]
+
+
+@kernel
+def further_stiffness(rows: Any, fixed: Any, j: int, length: float) -> float:
+    """Return the derivative of :func:`further_tension` by length [N/m]."""
     full = full_length(fixed, j)
     strain = 1.0 - length / full
-    return correction_slope(fixed, j, K.EFFECT.law, drive_of(rows, j), strain) / full  # type: ignore[no-any-return]
+    more = correction_slope(fixed, j, K.EFFECT.law, drive_of(rows, j), strain)
+    if fixed[K.MUSCLE_YIELD_FORCE][j] > 0.0:
+        stiff, _, slope = yield_at(rows, fixed, j, strain)
+        more = more + stiff * slope
+    return more / full  # type: ignore[no-any-return]
 
 
 @kernel
@@ -248,6 +287,7 @@ def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
     rows[EFFECTS_AT + K.STATE.effective][j] = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective)
     rows[EFFECTS_AT + K.STATE.beyond][j] = 0.0
     rows[EFFECTS_AT + K.STATE.stuck][j] = 1.0
+    rows[EFFECTS_AT + K.STATE.deflection][j] = rows[EFFECTS_AT + K.STATE.yielded][j] = 0.0
 
 
 def muscle_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
@@ -265,8 +305,8 @@ def muscle_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
         "begin_enclosed": begin_enclosed,
         "enclosed_stiffness": enclosed_stiffness,
         "leaked_air": leaked_air,
-        "more_tension": corrected_tension,
-        "more_stiffness": corrected_stiffness,
+        "more_tension": further_tension,
+        "more_stiffness": further_stiffness,
         "brace_drag": viscous_drag,
         "report_drag": report_drag,
     }

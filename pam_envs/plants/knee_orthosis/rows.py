@@ -40,10 +40,20 @@ globals().update(
             activation="largest_torque floor rise_time fall_time",
             **dict.fromkeys(SENSORS, "noise resolution bias"),
         ),
-        path_effects("muscle", bearing="lever", sensors=SENSORS, law="muscle", viscous="muscle"),
+        path_effects(
+            "muscle",
+            bearing="lever",
+            sensors=SENSORS,
+            law="muscle",
+            yields="muscle",
+            viscous="muscle",
+        )
+        | {"tail": ("muscle.yield_tail",)},
         {
             "effective": 1,
             "beyond": 1,
+            "deflection": 1,
+            "yielded": 1,
             "path": PATH_STATE.end,
             "stuck": 1,
             "sensors": sensor_rows(len(SENSORS)),

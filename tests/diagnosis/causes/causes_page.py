@@ -45,7 +45,7 @@ GIVEN = {
     "muscle.braid_angle": "the plant; only drawings depend on it",
     "muscle.map_pressure": "the plant; range of the map of `static_law`",
     "muscle.map_strain": "the plant; range of the map of `static_law`",
-    "muscle.yield_share": "joint, elbow and arm: the base, with the shape of the loops",
+    "muscle.yield_share": "joint, elbow, knee and arm: the base, with the shape of the loops",
     "muscle.temperature": "the recording, `temperature_C`; 20 °C without it",
     "hysteresis.creep_time_1": "the plant; four fixed times cover 0.1 to 300 s",
     "hysteresis.creep_time_2": "the plant",
