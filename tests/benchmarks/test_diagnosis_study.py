@@ -216,7 +216,8 @@ def test_traces_are_compared_on_the_output_with_the_largest_effect():
     )
     constant = np.ones((2, 1)) * NOISE[:, None]
 
-    def left(trace: np.ndarray) -> np.ndarray:
+    def left(trace: np.ndarray, name: str) -> np.ndarray:
+        assert name == "creep"
         rows = trace / NOISE[:, None]
         return rows - rows.mean(axis=1, keepdims=True)
 

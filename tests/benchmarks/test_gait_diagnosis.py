@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.diagnosis import gait_diagnosis as study
-from benchmarks.diagnosis.gait_recording import GaitRecording, record
+from benchmarks.diagnosis.gait import diagnosis as study
+from benchmarks.diagnosis.gait.recording import GaitRecording, record
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE
 
 STRIDES = 18

@@ -5,7 +5,7 @@ of the shank. :func:`diagnose` compares the estimate with the knee torque of a g
 refits the length of the shank, and compares rival terms on held-out strides, with the search and
 the decision rule of the muscle diagnosis.
 
-``python -m benchmarks.diagnosis.gait_diagnosis`` prints the results at several paces.
+``python -m benchmarks.diagnosis.gait.diagnosis`` prints the results at several paces.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.diagnosis.gait_recording import GaitRecording, record
+from benchmarks.diagnosis.gait.recording import GaitRecording, record
 from benchmarks.diagnosis.plain_plant import Parameters, PlainPlant, plain_causes
 from pam_envs.arrays import Array
 from pam_envs.constants import GRAVITY

@@ -1,0 +1,1 @@
+"""Diagnosis of the estimate of the knee torque during a gait."""
