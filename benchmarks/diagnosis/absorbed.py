@@ -1,4 +1,4 @@
-"""Part of an effect's trace that a refit of the flexible base does not absorb, for its size.
+"""Part of an effect's trace that a refit of the flexible base does not absorb.
 
 The base of a clean rig lacks the differences that this rig does not need. Where a hidden effect
 calls for one, as the friction of a guide does for friction driven by length, the refit adds it.
@@ -19,9 +19,9 @@ from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of, 
 from pam_envs.diagnosis.fit.single_muscle import clock_of
 
 SHIFT = 0.5
-"""Step of the offsets of the clock [rows], of which a refit has one."""
+"""Step between the clock offsets that are tried [rows]; a refit has one of them."""
 RANK = 1e-6
-"""Relative size of the singular directions, squared, that count."""
+"""Least eigenvalue, over the largest, of a direction that counts."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Absorbed:
         return cls(problem, np.vstack(made), dict(_differences(study, causes)), moved)
 
     def left(self, rows: Array, name: str = "") -> Array:
-        """Return what is left of a trace over the noise (channels, T) of a hidden effect.
+        """Return the unabsorbed part of a hidden effect's trace, over the noise (channels, T).
 
         It is the least that remains with one of the offsets of the clock, or with none.
         """

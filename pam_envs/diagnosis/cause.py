@@ -44,7 +44,7 @@ class Form:
     # search for starting values from the base's fit, instead of those of the terms
     # (pam_envs.diagnosis.fit.starting_values)
     search: Callable[..., Sequence[Sequence[float]]] | None = None
-    title: str = ""  # name in a sentence, where that of the cause claims more than the form shows
+    title: str = ""  # replaces that of the cause, where it claims more than the form shows
 
     def start(self, k: int) -> list[float]:
         """Return the ``k``-th starting value of each term, the last one of those with fewer."""
@@ -102,7 +102,7 @@ class Cause:
                 raise ValueError(f"{self.name} needs {word!r}, which no recording has{hint}")
 
     def title_of(self, form: Form) -> str:
-        """Return the name in a sentence of one of its forms."""
+        """Return the title of one of the forms, that of the cause by default."""
         return form.title or self.title
 
     @property

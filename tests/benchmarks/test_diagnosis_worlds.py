@@ -200,7 +200,7 @@ def test_same_records_give_same_files(tmp_path):
 
 
 class Flat:
-    """Order of residuals that of the samples."""
+    """Problem whose residuals are in the order of the samples."""
 
     @staticmethod
     def vectors(rows):
@@ -239,7 +239,7 @@ def test_refit_absorbs_one_offset_of_the_clock():
     assert np.linalg.norm(both) > 0.8 * min(np.linalg.norm(early), np.linalg.norm(late))
 
 
-def test_directions_without_length_and_equal_ones_span_nothing_more():
+def test_zero_and_parallel_rows_add_nothing_to_an_orthonormal_basis():
     from benchmarks.diagnosis.absorbed import orthonormal
 
     rows = np.random.default_rng(5).normal(size=(3, 50))

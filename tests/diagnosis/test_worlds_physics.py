@@ -240,7 +240,7 @@ def test_cascade_starts_without_slope_and_does_not_overshoot() -> None:
 
 
 @pytest.mark.parametrize("number", [1, 6, 7])
-def test_slower_exhaust_of_a_regulator_of_second_order_keeps_with_the_integrators_step(number):
+def test_slower_exhaust_of_second_order_regulator_is_independent_of_integration_step(number):
     world, rng = WORLDS[number], np.random.default_rng(FIRST_SEED)
     rig = draw_rig(world, rng, False)
     effect = draw_effect("exhaust_asymmetry", rig, rng)

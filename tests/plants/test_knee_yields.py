@@ -26,9 +26,9 @@ def yielding(plant: KneeOrthosis, share: float) -> KneeOrthosis:
 
 @pytest.fixture(scope="module", params=[("brace", 0.0), ("brace", 0.6), ("leg", 0.6)])
 def motion(request):
-    """Record a brace; return the plant, pressures [Pa], strains and the friction [N].
+    """Simulate a brace; return the plant, pressures [Pa], strains and friction [N].
 
-    The friction is what the tension lacks.
+    The friction is the tension of the force law less the simulated tension.
     """
     name, share = request.param
     plant = yielding(PLANTS[name], share)

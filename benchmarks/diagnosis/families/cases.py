@@ -56,7 +56,7 @@ def parts_of(place: str) -> tuple[str, str]:
 
 
 TUNED = ("braid", "exponential")
-"""Worlds on which the diagnosis is developed; the others are never used in its development."""
+"""Worlds on which the diagnosis is developed; no threshold is tuned on the others."""
 HELD_OUT = tuple(world for world in WORLDS if world not in TUNED)
 PLACES = tuple(
     place_of(family, world)

@@ -300,11 +300,11 @@ class FlexibleBase:
         return model
 
     def with_fault_alone(self, chosen: Sequence[tuple[Cause, Form]], model: Candidate) -> Candidate:
-        """Return a model, or a smaller one whose only difference is a fault, if it is sufficient.
+        """Return the base with one fault as its only difference, if that suffices, else ``model``.
 
-        It is sufficient if it is as good as the model with every difference, and better than that
-        without the fault. Beside a large fault, a fit with every difference may end far from one
-        with that alone, and refits without one of the others do not leave its valley.
+        It suffices if it is as good as ``model`` and better than all other differences together.
+        With a large fault, the fit of all differences may end in a local minimum that dropping them
+        one by one does not leave.
         """
         least = self.rule.least_gain
         for cause, form in chosen:

@@ -65,7 +65,7 @@ INSTANT = {"dead_time": 0.0, "slew_rate": 1e9, "gain": 1.0}
 VALVE_SETTINGS = {n: SETTINGS[n] for n in (*STAGES, *SPEEDS, *INTEGRAL, *ORIFICES)}
 """Settings of the fit of regulators of other kinds than a lag of first order."""
 LESS, MORE = 0.4, 2.5
-"""Conductances of orifices over the plant's at which a fit starts."""
+"""Starting values of the orifice conductance, over that of the plant."""
 LEAST_LAG = 2e-3
 """Least time constant of a regulator [s]."""
 CONDUCTANCE = "regulator.conductance"
@@ -157,7 +157,7 @@ class CompiledFamily(UsualStart):
         return tuple(share * self.plant.value(CONDUCTANCE) for share in (LESS, MORE))
 
     def finer(self, step: float) -> "CompiledFamily":
-        """Return the family, whose steps are fine."""
+        """Return the family itself, whose sub-steps are short enough."""
         return self
 
     @property
@@ -398,9 +398,9 @@ def regulator_of(
 def further_regulator(
     problem: Problem, family: Any, blocks: Blocks, base: Candidate, limit: Cause, causes: Causes
 ) -> tuple[Any, Mapping[str, float]] | None:
-    """Return a family with another kind of regulator, if pressures need one, and its values.
+    """Return a family with another kind of regulator and its values, if pressures need one.
 
-    The pressures are those of the fitted motion, which changes the volume of the muscles.
+    The regulator is simulated under the fitted motion, which changes the volume of the muscles.
     """
     pressures = [c.startswith("pressure") for c in family.channels]
     if family.measured_drive or LAG not in {f.name for f in family.base()}:
@@ -431,9 +431,9 @@ def calibrate_compiled(
 ) -> Calibration:
     """Fit the base of a plant: the regulator to the pressures alone, then all parameters.
 
-    ``limit`` is the cause of a rate limit; of the other ``causes``, those that act on the pressures
-    are tried in the selection of another kind of regulator, where the base lacks it. There is none
-    without a limit.
+    If the pressures need another kind of regulator than a lag, it is selected with ``limit``, the
+    cause of a rate limit, and with those of the other ``causes`` that act on the pressures. Without
+    ``limit``, no other kind is tried.
     """
     family = family.spanning(measured)
     problem = Problem(
@@ -458,7 +458,7 @@ def calibrate_compiled(
 def fitted(
     problem: Problem, family: Any, blocks: Blocks, found: Mapping[str, float], column: Array
 ) -> Calibration:
-    """Fit all base parameters, from values of the regulator and the column with them."""
+    """Fit all base parameters, starting from regulator values and the column that has them."""
     measured, noise = problem.measured, problem.noise
     problem = replayed_by(family, problem)
     law, wide = family.guesses(measured, noise, column)

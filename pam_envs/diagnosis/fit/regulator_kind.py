@@ -52,7 +52,7 @@ FITS = 1.2
 KIND_GAIN, TAIL_GAIN = 0.2, 0.3
 """Least gain of a further kind over the lags with one effect, and that of the slow tail."""
 ENOUGH = 0.7
-"""Share of the gain of a model that leaves only noise from which a smaller one is sufficient."""
+"""Share of the largest possible gain, that of a fit to the noise, that also suffices."""
 SHOWN_GAIN, CLOSE, MOST_SHOWN = 0.5, 0.7, 3
 """Least gain of an effect that the pressure shows, share of it that no other effect may reach, and
 largest number of such effects."""
@@ -357,7 +357,7 @@ class Selection:
         return bool(self.left(fit).max() >= FITS)
 
     def possible(self, fit: Fit) -> float:
-        """Return the gain over a fit of one that leaves only noise."""
+        """Return the largest possible gain over a fit, that of a model that leaves only noise."""
         return float(np.log(np.maximum(1.0, self.left(fit))).sum())
 
     def gain(self, before: Fit, after: Fit) -> float:

@@ -158,9 +158,9 @@ def drive_of(rows: Any, j: int) -> float:
 
 @kernel
 def yield_at(rows: Any, fixed: Any, j: int, strain: float) -> tuple[float, float, float]:
-    """Return stiffness by strain [N], deflection and its slope of the yielding friction.
+    """Return the yielding friction's stiffness [N], and its deflection at a strain with its slope.
 
-    At a strain of the muscle of lane ``j``, from where the friction was last.
+    The deflection of lane ``j`` continues from the last stored one; the stiffness is per strain.
     """
     stiff, limit = yield_spring(fixed, j, K.EFFECT.soft, drive_of(rows, j))
     deflection, slope = deflected_with_tail(

@@ -26,18 +26,18 @@ damping over its force [s/rad]."""
 PACE = 1e-3
 """Rate of contraction [1/s] below which Eyring's flow is in proportion to it."""
 YIELD = 1.5e-3
-"""That rate [1/s] for the power law of a viscous loss."""
+"""Rate of contraction [1/s] below which the power law of a viscous loss is nearly linear."""
 AIR = 1.013
 """Pressure of the atmosphere [bar]."""
 SEALED, DRIVEN = 0.02, 0.6
 """Half width of the rounding of a slack muscle over its size, and difference of pressures [bar]
 beyond which creep by activation is faster than its time constant."""
 OVERLAP = 0.4
-"""Of the ports by the spool to either side, over the dead band."""
+"""Overlap of the spool on either side of its ports, over the dead band."""
 WINDUP = 0.1
-"""Bound of the integral over the error that opens the valve."""
+"""Bound of the integral term, over the error that opens the valve fully."""
 SHEAR = 0.4
-"""Speed [rad/s] at which the grease of a sticking bearing takes its breakaway torque."""
+"""Speed [rad/s] at which the viscous torque of a bearing equals its breakaway torque."""
 
 
 @njit(cache=True)
@@ -124,9 +124,10 @@ def regulate(
 
 @njit(cache=True)
 def through(one: float, other: float, choke: float) -> float:
-    """Return the flow of an orifice from one pressure to another [bar], choked at a ratio of them.
+    """Return the flow of an orifice between two pressures [bar], choked below a critical ratio.
 
-    The choked flow equals the upstream pressure; the last 0.5 % of the ratio are laminar.
+    It is scaled so that choked flow equals the upstream pressure. Above a ratio of 0.995 it is
+    laminar.
     """
     up, down = max(one, other), min(one, other)
     ratio = down / up
@@ -148,8 +149,8 @@ def valve_flow(
 ) -> tuple[float, float, float]:
     """Return pressure [bar], position of the spool and integral of the error [bar] after a step.
 
-    The controller has two terms, and its integral is bounded (Astrom and Hagglund 1995); the spool
-    overlaps its ports, and the volume grows with the contraction.
+    A PI controller with anti-windup (Astrom and Hagglund 1995) moves the spool, which overlaps its
+    ports; the volume grows with the contraction.
     """
     error, span = max(c[3] * target + c[4], 0.0) - p, c[2] / c[0]
     error -= min(max(error, -OVERLAP * c[6]), OVERLAP * c[6])
@@ -223,10 +224,10 @@ def hold(
     push: np.ndarray,
     dt: float,
 ) -> None:
-    """Change speeds [rad/s] by the impulses ``push`` of bearings that stick or slip.
+    """Apply the friction impulses ``push`` of bearings that stick or slip to speeds [rad/s].
 
-    Each stops its joint unless it would exceed its bound, the breakaway torque at rest, which
-    falls with the speed ``before`` (Hess and Soom 1990); solved joint by joint (Moreau 1988).
+    An impulse stops its joint unless that exceeds a bound: the breakaway torque at rest, less at a
+    higher speed ``before`` (Hess and Soom 1990). Impulses are solved joint by joint (Moreau 1988).
     """
     n = len(v)
     for i in range(n):

@@ -1,7 +1,7 @@
 """Names and units of the numbers that describe a muscle, a regulator and a joint."""
 
 ELEMENTS = 4
-"""Of the Maxwell-slip model."""
+"""Number of elements of the Maxwell-slip model."""
 
 MUSCLE = (
     "size",  # force at 2 bar and full length [N]

@@ -53,7 +53,7 @@ SCALARS = (
 
 @njit(cache=True)
 def _slowed(rate: float, eff: np.ndarray, p: float) -> float:
-    """Return a rate of pressure [bar/s] whose exhaust is slower than filling."""
+    """Return a rate of pressure [bar/s], slowed by the effect during exhaust."""
     size = eff[EXHAUST, 0]
     if rate >= 0.0 or size <= 0.0:
         return rate

@@ -196,7 +196,8 @@ def truth_of(rig: Rig) -> dict[str, bool]:
 
     A choked orifice and a turbulent restriction limit the rate of large steps, so they count as
     a rate limit. The exhaust differs where orifice, rate limit or lag differ by more than 3 % from
-    those of filling. A pressure that is not proportional to the setpoint is a nonlinear reading.
+    those of filling. A pressure that is not proportional to the setpoint counts as a nonlinear
+    reading.
     """
     value = rig.valve_value
     pairs = (

@@ -4,13 +4,13 @@ Potentiometers, draw-wire sensors and bridges follow their calibration line at t
 between them. The error is a parabola and an S that vanish at zero and at full scale. It is not
 separable from a static law of the same curvature, unless that law acts at several loads. A
 nonlinear pressure reading is not separable from a regulator whose pressure is not proportional to
-its setpoint: the static law absorbs the difference between the two pressures.
+its setpoint: the two differ only in the true pressure, and the static law absorbs that.
 """
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 TITLES = {"pressure": "the nonlinearity of the pressure sensor or of the regulator"}
-"""Names in a sentence of the forms that show more than a sensor."""
+"""Titles of the forms that cannot tell a sensor from a regulator."""
 
 CAUSE = Cause(
     name="sensor_nonlinearity",
