@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pam_envs.arrays import Array
+from pam_envs.data.recording.clock import runs_of
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.decide.flexible_base import STARTS
 from pam_envs.diagnosis.decide.isolability import base_subspace, projected
@@ -83,14 +84,13 @@ def _shifts(study: Study, outputs: Array) -> Iterator[Array]:
     recording = study.recording
     most = clock_of(recording, study.sheet) / recording.period
     at = np.arange(len(recording.time), dtype=float)
-    starts = np.flatnonzero(recording.restart)
-    ends = np.append(starts[1:], len(at))
+    runs = runs_of(recording.restart)
     for late in SHIFT * np.arange(1, int(most / SHIFT) + 1):
         for sign in (-1.0, 1.0):
             moved = np.empty_like(outputs)
-            for a, b in zip(starts, ends, strict=True):
+            for run in runs:
                 for channel, values in zip(moved, outputs, strict=True):
-                    channel[a:b] = np.interp(at[a:b] + sign * late, at[a:b], values[a:b])
+                    channel[run] = np.interp(at[run] + sign * late, at[run], values[run])
             yield (moved - outputs) / study.problem.noise[:, None]
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,6 +38,12 @@ class Clock:
     period: float
     restart: Flags
     gap: Flags
+
+
+def runs_of(restart: Flags) -> list[slice]:
+    """Return the samples of each run between restarts (T,), of which the first one is True."""
+    starts = np.flatnonzero(restart).tolist()
+    return [slice(a, b) for a, b in pairwise([*starts, len(restart)])]
 
 
 def read_clock(

@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 
 from pam_envs.arrays import Array, Flags
+from pam_envs.data.recording.clock import runs_of
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.cause import Cause, Form
@@ -64,9 +65,7 @@ def shapes_of(recording: Recording, sheet: Rig) -> Array:
     start, unless the rig declares that it began at rest.
     """
     n, period = len(recording.time), recording.period
-    starts = np.flatnonzero(recording.restart)
-    ends = np.append(starts[1:], n)
-    runs = [slice(a, b) for a, b in zip(starts, ends, strict=True)]
+    runs = runs_of(recording.restart)
     made = [np.ones(n)]
     if sheet.rezeroed:
         made = [(recording.segment == k).astype(float) for k in range(len(recording.segments))]

@@ -146,17 +146,14 @@ class PairFamily(RegulatedFamily):
 
     def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
         """Return starting values at which all friction yields smoothly."""
-        names = [name for name in found if name.startswith(WEIGHT)]
-        thresholds = getattr(self.plant.hysteresis.operator, "thresholds", ())
-        weights = np.array([found[name] for name in names])
-        if not names or weights.sum() <= 0.0:
+        slip, stiff = self.friction_of(found)
+        if stiff <= 0.0:
             return dict(found)
-        slip = float(weights @ np.array(thresholds))  # [1], over the stiffness of the friction
         base, rate = found["hysteresis.base"], found["hysteresis.rate"]
-        away = slip / float(weights.sum()) * base / (base + rate * REFERENCE_PRESSURE)
+        away = slip / stiff * base / (base + rate * REFERENCE_PRESSURE)
         return {
             **found,
-            **dict.fromkeys(names, 0.0),
+            **{name: 0.0 for name in found if name.startswith(WEIGHT)},
             "muscle.yield_force": base * slip,
             "muscle.yield_per_pressure": rate * slip,
             "muscle.yield_break": max(away, LEAST_BREAK),

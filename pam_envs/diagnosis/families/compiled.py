@@ -247,6 +247,15 @@ class CompiledFamily(UsualStart):
         operator = self.plant.hysteresis.operator
         return len(getattr(operator, "weights", ()))
 
+    def friction_of(self, found: Mapping[str, float]) -> tuple[float, float]:
+        """Return slip force and stiffness of the elements with fitted weights, over the friction's.
+
+        Both are 0 without weights.
+        """
+        thresholds = np.array(getattr(self.plant.hysteresis.operator, "thresholds", ()))
+        weights = np.array([found.get(f"{WEIGHT}{k}]", 0.0) for k in range(len(thresholds))])
+        return float(weights @ thresholds), float(weights.sum())
+
     def declared(self, name: str) -> Declaration:
         """Return the declaration of a free parameter."""
         if name.startswith(WEIGHT):
@@ -396,14 +405,20 @@ def regulator_of(
 
 
 def further_regulator(
-    problem: Problem, family: Any, blocks: Blocks, base: Candidate, limit: Cause, causes: Causes
+    problem: Problem,
+    family: Any,
+    blocks: Blocks,
+    base: Candidate,
+    limit: Cause | None,
+    causes: Causes,
 ) -> tuple[Any, Mapping[str, float]] | None:
     """Return a family with another kind of regulator and its values, if pressures need one.
 
     The regulator is simulated under the fitted motion, which changes the volume of the muscles.
     """
     pressures = [c.startswith("pressure") for c in family.channels]
-    if family.measured_drive or LAG not in {f.name for f in family.base()}:
+    lags = not family.measured_drive and LAG in {f.name for f in family.base()}
+    if limit is None or not lags:
         return None
     if np.max(blocks.means(base.errors)[pressures], initial=0.0) < FITS:
         return None
@@ -443,9 +458,7 @@ def calibrate_compiled(
     )
     family, found, column = regulator_of(problem, family, blocks)
     made = fitted(problem, family, blocks, found, column)
-    other = None
-    if limit is not None:
-        other = further_regulator(made.problem, family, blocks, made.base, limit, causes)
+    other = further_regulator(made.problem, family, blocks, made.base, limit, causes)
     if other is None:
         return made
     again, valve = other

@@ -6,12 +6,12 @@ The pressure may change how far the friction of the bundles reaches, or how stif
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 
 from pam_envs.arrays import Array
+from pam_envs.data.recording.clock import runs_of
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.families.adapted import with_bearing, with_correction, with_yielding
@@ -21,7 +21,6 @@ from pam_envs.diagnosis.families.antagonistic_joint import (
     TITLES,
     difference_of,
 )
-from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.single_muscle import grouped
@@ -152,11 +151,10 @@ class BoundElbow(RegulatedFamily):
         At half of the full pressure it is that of the base, and there half of it is without
         pressure.
         """
-        thresholds = getattr(self.plant.hysteresis.operator, "thresholds", ())
-        weights = np.array([found.get(f"{WEIGHT}{k}]", 0.0) for k in range(len(thresholds))])
-        if not weights.sum() > 0.0:
+        slip, stiff = self.friction_of(found)
+        if stiff <= 0.0:
             return dict(found)
-        way = float(weights @ np.array(thresholds) / weights.sum())  # mean break [m]
+        way = slip / stiff  # mean break [m]
         law = {name: found[f"bundle_b.{name}"] for name in BUNDLE}
         bundle = dataclasses.replace(self.plant.bundle_b, **law)
         usual = 0.5 * self.plant.full_pressure
@@ -238,9 +236,8 @@ def intended(plant: ElbowOrthosis, recording: Recording) -> dict[str, Array]:
         mean = plant.pulley.middle if angle is None else float(np.mean(angle))
         return {"intent": np.full(len(recording.time), mean)}
     rate, acceleration = np.zeros(len(pose)), np.zeros(len(pose))
-    edges = [*np.flatnonzero(recording.restart), len(pose)]
-    for a, b in pairwise(edges):
-        if b - a > 1:
-            rate[a:b] = np.gradient(pose[a:b], recording.period)
-            acceleration[a:b] = np.gradient(rate[a:b], recording.period)
+    for run in runs_of(recording.restart):
+        if run.stop - run.start > 1:
+            rate[run] = np.gradient(pose[run], recording.period)
+            acceleration[run] = np.gradient(rate[run], recording.period)
     return {"intent": pose, "intent_rate": rate, "intent_acceleration": acceleration}

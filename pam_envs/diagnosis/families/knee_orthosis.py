@@ -134,19 +134,16 @@ class BoundKnee(RegulatedFamily):
 
     def flexible_guess(self, found: Mapping[str, float]) -> dict[str, float]:
         """Return starting values at which friction driven by length yields smoothly."""
-        names = [name for name in found if name.startswith(WEIGHT)]
-        thresholds = getattr(self.plant.hysteresis.operator, "thresholds", ())
-        weights = np.array([found[name] for name in names])
-        if not names or weights.sum() <= 0.0:
+        away, stiff = self.friction_of(found)
+        if stiff <= 0.0:
             return dict(found)
-        away = float(weights @ np.array(thresholds))  # [1], over the stiffness of the friction
         slip, empty = found["hysteresis.friction"] * away, found["hysteresis.empty"]
         return {
             **found,
-            **dict.fromkeys(names, 0.0),
+            **{name: 0.0 for name in found if name.startswith(WEIGHT)},
             "muscle.yield_force": max(LEAST_FORCE, empty * slip),
             "muscle.yield_per_pressure": (1.0 - empty) * slip / REFERENCE_PRESSURE,
-            "muscle.yield_break": away / float(weights.sum()) / self.plant.lever.full_length,
+            "muscle.yield_break": away / stiff / self.plant.lever.full_length,
             "muscle.yield_ratio": 0.5,
         }
 

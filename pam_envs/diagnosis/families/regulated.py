@@ -11,10 +11,12 @@ import numpy as np
 from pam_envs.arrays import Array, Flags
 from pam_envs.constants import BAR
 from pam_envs.data.recording.channels import WIRINGS
+from pam_envs.data.recording.clock import runs_of
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import Audit, audit_channels, levels_of
 from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.causes import by_name
 from pam_envs.diagnosis.experiment.channel_plans import ChannelMeans, ChannelPlan, channel_plans
 from pam_envs.diagnosis.experiment.plans import PERIOD
 from pam_envs.diagnosis.families.adapted import adapted
@@ -55,8 +57,6 @@ FORGOTTEN, FIRST = 0.2, 5
 of readings of the rest at the start."""
 RANGE = "map_pressure", "map_least", "map_strain"
 """Parameters of the range of a correction."""
-LIMIT = "slew_limit"
-"""Cause of a rate limit, which the lags of a regulator may have."""
 DRIVE_GAIN = 0.1
 """Gain on held-out blocks from which the friction of a base has the other drive: a tenth less of
 the mean square, beyond what the draw of the blocks changes."""
@@ -356,14 +356,12 @@ class RegulatedKind:
         between the branches of its loops it rests. Motion by a share of the range forgets it.
         """
         made = measured.copy()
-        starts = np.flatnonzero(restart)
-        ends = np.append(starts[1:], len(restart))
+        runs = runs_of(restart)
         for channel, values in zip(family.channels, made, strict=True):
             if channel.startswith("pressure") or not np.isfinite(values).any():
                 continue
             least = FORGOTTEN * float(np.nanmax(values) - np.nanmin(values))
-            for a, b in zip(starts, ends, strict=True):
-                run = values[a:b]  # a view
+            for run in (values[places] for places in runs):  # views
                 first = np.nanmedian(run[:FIRST]) if np.isfinite(run[:FIRST]).any() else np.nan
                 moved = np.abs(run - first) > least
                 run[: int(np.argmax(moved)) if moved.any() else 0] = np.nan
@@ -387,7 +385,7 @@ class RegulatedKind:
             inputs = set(self.pairs_of(family.plant).values())
             measured[[c in inputs for c in family.channels]] = np.nan  # inputs are no outputs
         every = self.causes(self.catalogue)
-        limit = next(cause for cause in every if cause.name == LIMIT)
+        limit = by_name("slew_limit", every)
         others = [cause for cause in every if not cause.common]
         data = measured, noise, blocks, time, shapes, limit, others
         found, rival = calibrate_compiled(family, *data), self.rival(family.plant)
