@@ -12,9 +12,16 @@ The plant writes volume and rate of change of the volume of the present position
 from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
-from pam_envs.kernels.arithmetic import count_on
+from pam_envs.kernels.arithmetic import clip, count_on, decay
 from pam_envs.kernels.build import LANES, kernel, scratch
-from pam_envs.pneumatics.flow import inflow, power_of_ratio, valve_opening
+from pam_envs.pneumatics.flow import (
+    answered_error,
+    gathered_rate,
+    inflow,
+    integrated_opening,
+    power_of_ratio,
+    valve_opening,
+)
 from pam_envs.pneumatics.regulator import AIR, AIR_STATE, leaked, line_step
 
 LEAST_VOLUME = 1e-9
@@ -94,6 +101,50 @@ def squeeze(
 
 
 @kernel
+def mean_share(x: float) -> float:
+    """Return the mean of ``exp(-t)`` over ``t`` from 0 to ``x``, at least 1e-6."""
+    return (1.0 - decay(x)) / x
+
+
+@kernel
+def controlled_flow(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, first: float, last: float,
+    goal: float, next_goal: float, fed: float, per_volume: float, h: float,
+) -> float:  # fmt: skip
+    """Return the pressure [Pa] of lane ``j`` after ``h`` seconds with an integral part, or a lag.
+
+    ``first`` and ``last`` are the shares of the step with ``goal`` and ``next_goal``, ``fed`` is
+    the absolute pressure of the source [Pa], ``per_volume`` the rise of the pressure with the mass
+    [Pa/kg].
+    """
+    p, dead = rows[state + AIR_STATE.regulated][j], fixed[effects + AIR.dead_band][j]
+    band, bend = fixed[effects + AIR.opening_band][j], fixed[effects + AIR.opening_bend][j]
+    gain, lag = fixed[effects + AIR.opening_integral][j], fixed[effects + AIR.opening_lag][j]
+    bound = fixed[effects + AIR.opening_windup][j] * band
+    fills, b = fixed[effects + AIR.conductance][j], fixed[effects + AIR.critical_ratio][j]
+    empties, span = fills * fixed[effects + AIR.exhaust_share][j], 1.0 / (1.0 - b)
+    spool, gathered = rows[state + AIR_STATE.opened][j], rows[state + AIR_STATE.integral][j]
+    middle, summed, opened = p, gathered, spool
+    for stage in range(2):  # explicit midpoint rule
+        part = 0.5 * h if stage == 0 else h
+        rate = first * gathered_rate(answered_error(middle, goal, dead), summed, band, gain)
+        rate = rate + last * gathered_rate(
+            answered_error(middle, next_goal, dead), summed, band, gain
+        )
+        wish = first * integrated_opening(middle, goal, dead, 1.0 / band, bend, summed)
+        wish = wish + last * integrated_opening(middle, next_goal, dead, 1.0 / band, bend, summed)
+        left = part / max(lag, 1e-9)
+        mean = wish + ((spool - wish) * mean_share(left) if lag > 0.0 else 0.0)
+        opened = wish + ((spool - wish) * decay(left) if lag > 0.0 else 0.0)
+        flow = inflow(mean, middle, fed, fills, empties, b, span)
+        middle = max(0.0, p + part * per_volume * flow)
+        summed = clip(gathered + part * rate, -bound, bound)
+    rows[state + AIR_STATE.integral][j] = summed
+    rows[state + AIR_STATE.opened][j] = opened
+    return middle
+
+
+@kernel
 def flow_step(
     rows: Any, fixed: Any, state: int, effects: int, pressure: Any, older: Any, newer: Any,
     late: Any, h: float, own: Any, valve: int, lines: int,
@@ -102,8 +153,9 @@ def flow_step(
 
     The setpoint [Pa] is ``older`` and then, for the share ``late``, ``newer``; below zero the valve
     is shut. A muscle is not filled past its setpoint or the source, nor emptied below the
-    atmosphere. ``own`` is two rows of scratch that receive the pressures before, at the regulator
-    and behind the line; ``valve`` and ``lines`` are those of ``regulator.air_step``.
+    atmosphere; with an integral part or a lag of the opening, the pressure may pass the setpoint.
+    ``own`` is two rows of scratch that receive the pressures before, at the regulator and behind
+    the line; ``valve`` and ``lines`` are those of ``regulator.air_step``.
     """
     regulated, space, drop = (
         rows[state + AIR_STATE.regulated],
@@ -150,6 +202,24 @@ def flow_step(
         after = p + rate * inflow(opened, middle, fed, fills, empties, b, span)
         after = max(low, min(high, after))
         reached[j] = after if on[j] > 0.0 else p
+    integrals, lags = fixed[effects + AIR.opening_integral], fixed[effects + AIR.opening_lag]
+    if count_on(integrals, 0.0) + count_on(lags, 0.0) > 0:
+        for j in range(LANES):
+            if on[j] > 0.0 and (integrals[j] > 0.0 or lags[j] > 0.0):
+                first = 1.0 - late[j] if older[j] >= 0.0 else 0.0
+                last = late[j] if newer[j] >= 0.0 else 0.0
+                p, source = regulated[j], min(upstream[j], reservoir[j]) - drop[j]
+                reached[j] = min(
+                    max(p, source),
+                    controlled_flow(
+                        rows, fixed, j, state, effects, first, last, gain[j] * older[j],
+                        gain[j] * newer[j], source + ATMOSPHERE,
+                        PRESSURE_PER_DENSITY / max(LEAST_VOLUME, space[j]), h,
+                    ),
+                )  # fmt: skip
+                shut = (newer[j] if late[j] > 0.0 else older[j]) < 0.0
+                for row in (AIR_STATE.opened, AIR_STATE.integral):
+                    rows[state + row][j] = 0.0 if shut else rows[state + row][j]
     if valve + count_on(fixed[effects + AIR.supply_droop], 0.0) > 0:
         for j in range(LANES):
             if on[j] > 0.0:

@@ -1,7 +1,8 @@
 """Air flow through the orifices of a proportional valve, ISO 6358.
 
 The valve opens in proportion to the error of its pressure control, fully beyond ``opening_band``:
-its supply orifice fills the muscle, its exhaust orifice empties it. The flow of an orifice is
+its supply orifice fills the muscle, its exhaust orifice empties it. The controller may have an
+integral part, and the spool a lag. The flow of an orifice is
 
     m' = C rho_0 p_1 f(p_2 / p_1),    f(x) = 1 for x <= b,  sqrt(1 - ((x - b) / (1 - b))^2) above
 
@@ -42,6 +43,7 @@ class FlowEffects:
         (
             *("flow", "conductance", "exhaust_share", "critical_ratio", "opening_band"),
             *("opening_bend", "polytropic", "source_pressure"),
+            *("opening_integral", "opening_windup", "opening_lag"),
         ),
     )
 
@@ -57,6 +59,13 @@ class FlowEffects:
         3.4e4, "Pa", 1e3, 5e5, "error that opens fully: lag of 50 ms times 6.8e5 Pa/s"
     )
     opening_bend: float = effect("1", -0.9, 1.0, "shape of opening by error: 0 linear, 1 quadratic")
+    opening_integral: float = effect(
+        "1/s", 0.0, 100.0, "integral gain of the controller over its proportional gain"
+    )
+    opening_windup: float = assumed(
+        1.0, "1", 0.01, 1.0, "anti-windup: largest integral part over opening_band"
+    )
+    opening_lag: float = effect("s", 0.0, 1.0, "lag of the opening, of the spool")
     polytropic: float = assumed(
         1.0, "1", 1.0, 1.4, "of compression by motion alone; 1: isothermal, 1.4: adiabatic"
     )
@@ -77,16 +86,46 @@ def mass_flow(upstream: float, downstream: float, conductance: float, critical: 
 
 
 @kernel
+def answered_error(pressure: float, goal: float, dead: float) -> float:
+    """Return the error of the pressure control beyond the ``dead`` band [Pa]."""
+    error = goal - pressure
+    return max(0.0, error - dead) + min(0.0, error + dead)
+
+
+@kernel
+def bent(opened: float, bend: float) -> float:
+    """Return the opening, from -1 to 1, that ``opening_bend`` makes of a linear one."""
+    return opened * (1.0 + bend * (abs(opened) - 1.0))
+
+
+@kernel
 def valve_opening(pressure: float, goal: float, dead: float, per_band: float, bend: float) -> float:
     """Return the opening of the valve, from -1 (exhaust) to 1 (supply).
 
     ``dead`` is the error [Pa] that it does not answer, ``per_band`` one over the further error that
     opens it fully, ``bend`` the ``opening_bend``.
     """
-    error = goal - pressure
-    answered = max(0.0, error - dead) + min(0.0, error + dead)
-    opened = clip(answered * per_band, -1.0, 1.0)
-    return opened * (1.0 + bend * (abs(opened) - 1.0))  # type: ignore[no-any-return]
+    return bent(clip(answered_error(pressure, goal, dead) * per_band, -1.0, 1.0), bend)  # type: ignore[no-any-return]
+
+
+@kernel
+def integrated_opening(
+    pressure: float, goal: float, dead: float, per_band: float, bend: float, gathered: float
+) -> float:
+    """Return the opening of :func:`valve_opening` of a controller with an integral part.
+
+    ``gathered`` is the integral part [Pa]. A valve with a ``dead`` band is shut within it.
+    """
+    answered = answered_error(pressure, goal, dead)
+    gathered = 0.0 if dead > 0.0 and answered == 0.0 else gathered
+    return bent(clip((answered + gathered) * per_band, -1.0, 1.0), bend)  # type: ignore[no-any-return]
+
+
+@kernel
+def gathered_rate(answered: float, gathered: float, band: float, gain: float) -> float:
+    """Return the rate of the integral part [Pa/s]: 0 where it would open a full valve further."""
+    total = answered + gathered
+    return 0.0 if abs(total) >= band and total * answered > 0.0 else gain * answered
 
 
 @kernel

@@ -125,8 +125,11 @@ def test_inflow_is_the_mass_flow_of_either_orifice(critical: float) -> None:
     assert inflow(-1.0, -1e4, source, *sizes) == 0.0
 
 
-def rates(plant: KneeOrthosis, set_point: float, volume: float) -> Callable[..., float]:
-    """Return dp/dt [Pa/s] of a chamber by ISO 6358, written out beside the kernels."""
+def rates(plant: KneeOrthosis, set_point: float, volume: float) -> Callable[..., Any]:
+    """Return the rates of a chamber's pressure [Pa], of the integral part [Pa] and of the opening.
+
+    By ISO 6358 and with a bounded PI controller, written out beside the kernels.
+    """
     air = plant.regulator
 
     def flow(up: float, down: float, size: float) -> float:
@@ -134,30 +137,75 @@ def rates(plant: KneeOrthosis, set_point: float, volume: float) -> Callable[...,
         part = (ratio - air.critical_ratio) / (1.0 - air.critical_ratio)
         return size * REFERENCE_DENSITY * up * float(np.sqrt(max(0.0, 1.0 - part**2)))
 
-    def rate(_: float, p: Any) -> float:
-        opened = float(np.clip((set_point - p[0]) / air.opening_band, -1.0, 1.0))
-        inside = p[0] + ATMOSPHERE
+    def rate(_: float, state: Any) -> list[float]:
+        p, gathered, spool = state
+        error, band = set_point - p, air.opening_band
+        wish = float(np.clip((error + gathered) / band, -1.0, 1.0))
+        opened = spool if air.opening_lag else wish
+        inside = p + ATMOSPHERE
         if opened > 0.0:
             mass = opened * flow(air.source_pressure + ATMOSPHERE, inside, air.conductance)
         else:
             mass = opened * flow(inside, ATMOSPHERE, air.conductance * air.exhaust_share)
-        return PRESSURE_PER_DENSITY * mass / volume
+        bound = air.opening_windup * band
+        full = abs(error + gathered) >= band and (error + gathered) * error > 0.0
+        ends = abs(gathered) >= bound and gathered * error > 0.0
+        grows = 0.0 if full or ends else air.opening_integral * error
+        turns = (wish - spool) / air.opening_lag if air.opening_lag else 0.0
+        return [PRESSURE_PER_DENSITY * mass / volume, grows, turns]
 
     return rate
 
 
+CONTROLS = (
+    {},
+    {"regulator.opening_integral": 4.0},
+    {"regulator.opening_integral": 8.0, "regulator.opening_windup": 0.1},
+    {"regulator.opening_lag": 0.04},
+    {"regulator.opening_integral": 4.0, "regulator.opening_lag": 0.02},
+)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize(("start", "set_point"), [(0.0, 4e5), (4e5, 0.5e5), (2e5, 2.2e5)])
-def test_held_muscle_fills_and_empties_as_iso_6358_states(start: float, set_point: float) -> None:
-    plant = KneeOrthosis.rig("none").with_lag_alone().with_air("flow")
-    plant = plant.replace({"regulator.exhaust_share": 0.6})
+def test_held_muscle_fills_and_empties_as_iso_6358_states(
+    start: float, set_point: float, control: dict[str, float]
+) -> None:
+    plant = dataclasses.replace(KneeOrthosis.rig("none"), substeps=8 if control else 4)
+    plant = plant.with_lag_alone().with_air("flow")
+    plant = plant.replace({"regulator.exhaust_share": 0.6, **control})
     made = simulate_knee(plant, np.full(150, set_point), pressure=start, compiled=False)
     volume = float(plant.muscle.volume_at(plant.fixture.length))
     times = PERIOD * np.arange(1, 151)
     exact = solve_ivp(
-        rates(plant, set_point, volume), (0.0, times[-1]), [start], "LSODA", times, rtol=1e-9,
-        atol=1e-3,
+        rates(plant, set_point, volume), (0.0, times[-1]), [start, 0.0, 0.0], "LSODA", times,
+        rtol=1e-9, atol=1e-6, max_step=1e-3,
     )  # fmt: skip
-    np.testing.assert_allclose(made["pressure"], exact.y[0], atol=60.0)
+    np.testing.assert_allclose(made["pressure"], exact.y[0], atol=300.0 if control else 60.0)
+
+
+@pytest.mark.parametrize("dead", [0.0, 3e3])
+def test_integral_part_removes_the_error_of_a_leak(dead: float) -> None:
+    plant = KneeOrthosis.rig("none").with_lag_alone().with_air("flow")
+    plant = plant.replace({"regulator.leak": 0.5, "regulator.dead_band": dead})
+    left = []
+    for control in ({}, {"regulator.opening_integral": 4.0}):
+        made = simulate_knee(plant.replace(control), np.full(400, 3e5), compiled=False)
+        left.append(3e5 - made["pressure"][-100:])
+    assert np.min(left[0]) > 1.5e3 + dead
+    lost = 0.5 * PERIOD / plant.substeps * 3e5  # by the leak in a sub-step
+    most = 2.0 * lost if dead else lost  # at the edge of the dead band, the valve opens and shuts
+    assert np.abs(left[1] - dead).max() < most
+
+
+def test_lane_keeps_its_bits_beside_a_controlled_valve() -> None:
+    plain = SingleMuscle.mas10(mass__load=1.0).replace(FLOW)
+    other = plain.replace({"regulator.opening_integral": 4.0, "regulator.opening_lag": 0.01})
+    command = np.r_[np.full(20, 3e5), np.full(30, 1e5), np.full(10, -1.0)]
+    for pair in ([plain, other], [other, plain]):
+        together = simulate(pair, command)["pressure"]
+        for k, plant in enumerate(pair):
+            assert np.array_equal(together[:, k], simulate(plant, command)["pressure"])
 
 
 def test_flow_into_a_moving_muscle_balances_its_mass() -> None:

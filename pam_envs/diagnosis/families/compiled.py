@@ -36,6 +36,7 @@ from pam_envs.diagnosis.fit.regulator_kind import (
 )
 from pam_envs.diagnosis.fit.single_muscle import (
     CLOCK,
+    CONTROL,
     INTEGRAL,
     LAG,
     LEAST_SOURCE,
@@ -62,7 +63,7 @@ WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hys
 ROUNDS, VALVE_ROUNDS = 25, 12
 INSTANT = {"dead_time": 0.0, "slew_rate": 1e9, "gain": 1.0}
 """Parameters of a regulator whose pressures are the measured ones."""
-VALVE_SETTINGS = {n: SETTINGS[n] for n in (*STAGES, *SPEEDS, *INTEGRAL, *ORIFICES)}
+VALVE_SETTINGS = {n: SETTINGS[n] for n in (*STAGES, *SPEEDS, *INTEGRAL, *ORIFICES, *CONTROL)}
 """Settings of the fit of regulators of other kinds than a lag of first order."""
 LESS, MORE = 0.4, 2.5
 """Starting values of the orifice conductance, over that of the plant."""
@@ -409,7 +410,7 @@ def further_regulator(
     family: Any,
     blocks: Blocks,
     base: Candidate,
-    limit: Cause | None,
+    limit: Cause,
     causes: Causes,
 ) -> tuple[Any, Mapping[str, float]] | None:
     """Return a family with another kind of regulator and its values, if pressures need one.
@@ -417,8 +418,7 @@ def further_regulator(
     The regulator is simulated under the fitted motion, which changes the volume of the muscles.
     """
     pressures = [c.startswith("pressure") for c in family.channels]
-    lags = not family.measured_drive and LAG in {f.name for f in family.base()}
-    if limit is None or not lags:
+    if family.measured_drive or {LAG, CONDUCTANCE}.isdisjoint(f.name for f in family.base()):
         return None
     if np.max(blocks.means(base.errors)[pressures], initial=0.0) < FITS:
         return None
@@ -458,6 +458,8 @@ def calibrate_compiled(
     )
     family, found, column = regulator_of(problem, family, blocks)
     made = fitted(problem, family, blocks, found, column)
+    if limit is None:
+        return made
     other = further_regulator(made.problem, family, blocks, made.base, limit, causes)
     if other is None:
         return made

@@ -33,7 +33,9 @@ from pam_envs.diagnosis.fit.least_squares import (
 from pam_envs.diagnosis.fit.single_muscle import (
     BORE,
     CLOCK,
+    CONTROL,
     INTEGRAL,
+    OPENINGS,
     ORIFICES,
     SECOND_ORDER,
     SPEEDS,
@@ -137,6 +139,8 @@ class Selection:
         simpler = [frees for frees in tried if {f.name for f in frees} < set(found)]
         again = [Fit.at_start(start_at_guess(frees, found), family.column) for frees in simpler]
         chosen = self.simplest([*sorted(again, key=_size), chosen], LONG_ROUNDS)
+        if flows:
+            return self.with_control(chosen)
         return with_values(family, chosen, STAGES), chosen
 
     def aside(self, family: Any) -> tuple[Free, ...]:
@@ -322,7 +326,25 @@ class Selection:
             frees = start_at_guess((*regulator_of(other), *self.aside(other)), begin)
             fits += [Fit.at_start(frees, column) for column in columns]
         of = self.of(other)
-        return other, of.simplest(promising(of.only, fits), LONG_ROUNDS)
+        return of.with_control(of.simplest(promising(of.only, fits), LONG_ROUNDS))
+
+    def with_control(self, fit: Fit) -> Made:
+        """Return the orifices and a fit, with a lag of the opening or an integral part if needed.
+
+        One that the plant already has is kept.
+        """
+        plant = self.family.plant
+        if not self.lacks(fit) or any(plant.value(n) != plant.neutral[n] for n in CONTROL):
+            return self.family, fit
+        begin = start_at_guess(fit.frees, fit.values())
+        column = column_of(fit, fit.z)
+        fits = [fit]
+        for openings in ((OPENINGS[0],), (OPENINGS[1],), OPENINGS):
+            values = {n: v for opening in openings for n, v in opening.items()}
+            further = (self.family.free(n, start=v) for n, v in values.items())
+            fits.append(Fit.at_start((*begin, *further), column))
+        made = self.simplest(fits, LONG_ROUNDS)
+        return with_values(self.family, made, CONTROL), made
 
     def of(self, family: Any) -> "Selection":
         """Return the selection with the simulation of another family."""

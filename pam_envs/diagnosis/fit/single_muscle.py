@@ -65,6 +65,9 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.opening_band": {"log": True, "prior": 2.0},
     "regulator.opening_bend": {"scale": 0.2, "prior": 3.0},
     "regulator.source_pressure": {"log": True, "prior": 0.5},
+    "regulator.opening_lag": {"log": True, "low": 2e-3, "high": 0.3, "prior": 2.0},
+    "regulator.opening_integral": {"log": True, "low": 0.1, "high": 50.0, "prior": 2.0},
+    "regulator.opening_windup": {"log": True, "low": 0.01, "high": 1.0, "prior": 2.0},
     "regulator.pilot_lag": {"log": True, "low": 2e-3, "prior": 2.0},
     "regulator.pilot_damping": {"log": True, "low": 0.15, "high": 4.0, "prior": 1.0},
     "regulator.rate_lag": {"log": True, "low": 2e-3, "prior": 2.0},
@@ -108,9 +111,15 @@ SPOOL = {"regulator.rate_lag": 0.02}
 SECOND_ORDER = (PILOT, SPOOL)
 STAGES = frozenset(name for order in SECOND_ORDER for name in order)
 """Parameters of regulators of second order."""
-BASE = tuple(
-    name for name in SETTINGS if name not in {*STAGES, *INTEGRAL, *ORIFICES, *SPEEDS, BORE, START}
+OPENINGS = (
+    {"regulator.opening_lag": 0.01},
+    {"regulator.opening_integral": 4.0, "regulator.opening_windup": 0.3},
 )
+"""Starting values of the lag of a valve's opening, and of the integral part of its controller."""
+CONTROL = frozenset(name for opening in OPENINGS for name in opening)
+"""Parameters of the control of a valve with orifices."""
+ELSEWHERE = {*STAGES, *INTEGRAL, *ORIFICES, *CONTROL, *SPEEDS, BORE, START}
+BASE = tuple(name for name in SETTINGS if name not in ELSEWHERE)
 CLOCK = "clock.offset"
 """Time [s] by which the readings lag the command: no parameter of the plant."""
 USUAL_ROWS = 2.5
@@ -118,8 +127,9 @@ USUAL_ROWS = 2.5
 
 
 def stages_of(plant: Any) -> list[str]:
-    """Return the parameters of the second orders that the regulator of a plant has."""
-    return [n for order in SECOND_ORDER if plant.value(next(iter(order))) > 0.0 for n in order]
+    """Return the parameters of second orders and of openings that the regulator of a plant has."""
+    on = [s for s in (*SECOND_ORDER, *OPENINGS) if plant.value(next(iter(s))) > 0.0]
+    return [name for stage in on for name in stage if name not in plant.inert]
 
 
 def clock_of(recording: Any, rig: Any) -> float:

@@ -39,12 +39,24 @@ def selected(family: MuscleFamily, values: dict[str, float]) -> tuple[MuscleFami
         ({"regulator.speed_2": 0.8, "regulator.speed_6": 0.6, "regulator.speed_20": 0.4}, "speed"),
         ({"regulator.integral": 60.0, "regulator.integral_release": 1.0}, "integral"),
         ({"regulator.flow": 1.0, "regulator.opening_bend": 0.5}, "flow"),
+        (
+            {
+                **{"regulator.flow": 1.0, "regulator.opening_integral": 4.0},
+                **{"regulator.opening_windup": 0.2, "regulator.opening_lag": 0.015},
+            },
+            "integrating flow",
+        ),
     ],
 )
 def test_it_finds_the_kind(family: MuscleFamily, values: dict[str, float], kind: str) -> None:
     found, shown = selected(family, values)
     air = found.plant.regulator
-    kinds = {"speed": air.speed_20 != 1.0, "integral": air.integral > 0.0, "flow": air.flow > 0.0}
+    kinds = {
+        "speed": air.speed_20 != 1.0,
+        "integral": air.integral > 0.0,
+        "flow": air.flow > 0.0 and air.opening_integral == 0.0,
+        "integrating flow": air.flow > 0.0 and air.opening_integral > 0.0,
+    }
     assert [name for name, on in kinds.items() if on] == [kind][: bool(kind)]
     assert shown == []
 
