@@ -40,6 +40,7 @@ from pam_envs.diagnosis.fit.single_muscle import (
     SECOND_ORDER,
     SPEEDS,
     STAGES,
+    stages_of,
 )
 from pam_envs.pneumatics.flow import AIRS, REPLACED, SWITCH
 
@@ -333,8 +334,7 @@ class Selection:
 
         One that the plant already has is kept.
         """
-        plant = self.family.plant
-        if not self.lacks(fit) or any(plant.value(n) != plant.neutral[n] for n in CONTROL):
+        if not self.lacks(fit) or CONTROL & set(stages_of(self.family.plant)):
             return self.family, fit
         begin = start_at_guess(fit.frees, fit.values())
         column = column_of(fit, fit.z)
