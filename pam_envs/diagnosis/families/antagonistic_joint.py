@@ -17,7 +17,7 @@ from pam_envs.diagnosis.families.adapted import (
 from pam_envs.diagnosis.families.compiled import WEIGHT
 from pam_envs.diagnosis.families.pair_balance import PairBalance
 from pam_envs.diagnosis.families.regulated import REGULATOR, RegulatedFamily, RegulatedKind
-from pam_envs.diagnosis.fit.single_muscle import grouped
+from pam_envs.diagnosis.fit.single_muscle import BORE, grouped
 from pam_envs.diagnosis.plant_protocol import Loop, Signals
 from pam_envs.plants.antagonistic_joint.hysteresis import REFERENCE_PRESSURE
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -109,6 +109,7 @@ class PairFamily(RegulatedFamily):
     corrected: ClassVar[tuple[tuple[int, int], ...]] = CORRECTED
     """Orders in pressure and strain of the terms that the law lacks."""
     last: ClassVar[tuple[str, ...]] = ("muscle.braid_strain",)
+    volumes: ClassVar[tuple[str, ...]] = (BORE,)
 
     def joint_channels(self) -> list[tuple[str, tuple[str, str]]]:
         """Return the channel of each joint's angle, and those of its pressures."""

@@ -35,6 +35,7 @@ from pam_envs.diagnosis.fit.regulator_kind import (
     start_at_guess,
 )
 from pam_envs.diagnosis.fit.single_muscle import (
+    BORE,
     CLOCK,
     CONTROL,
     INTEGRAL,
@@ -63,7 +64,8 @@ WEIGHTS = Declaration("1", 0.0, 1.0, "assumed", "weight of an element of the hys
 ROUNDS, VALVE_ROUNDS = 25, 12
 INSTANT = {"dead_time": 0.0, "slew_rate": 1e9, "gain": 1.0}
 """Parameters of a regulator whose pressures are the measured ones."""
-VALVE_SETTINGS = {n: SETTINGS[n] for n in (*STAGES, *SPEEDS, *INTEGRAL, *ORIFICES, *CONTROL)}
+VALVES = (*STAGES, *SPEEDS, *INTEGRAL, *ORIFICES, *CONTROL, BORE)
+VALVE_SETTINGS = {name: SETTINGS[name] for name in VALVES}
 """Settings of the fit of regulators of other kinds than a lag of first order."""
 LESS, MORE = 0.4, 2.5
 """Starting values of the orifice conductance, over that of the plant."""
@@ -83,6 +85,8 @@ class UsualStart:
     """Whether steps of a fit of the base are also limited by parameter; the best fit is kept."""
     linear: ClassVar[bool] = True
     """Whether a linear model may show that a difference is needed, without a refit."""
+    volumes: ClassVar[tuple[str, ...]] = ()
+    """Sizes of enclosed volumes, which are fitted with flow through orifices."""
 
     def guesses(
         self, measured: Array, noise: Array, column: Array
@@ -280,7 +284,8 @@ class CompiledFamily(UsualStart):
         if name == SOURCE:  # a muscle is filled from above its largest setpoint
             made["low"] = max(d.low, LEAST_SOURCE * self.plant.regulator.max_pressure)
         place = self.plant.names.index(name)
-        settings = {**VALVE_SETTINGS.get(name, {}), **self.settings.get(name, {})}
+        usual = VALVE_SETTINGS.get(BORE if name in self.volumes else name, {})
+        settings = {**usual, **self.settings.get(name, {})}
         return Free(name, place, **{**made, **settings, **changes})
 
     def base(self) -> tuple[Free, ...]:
@@ -292,7 +297,7 @@ class CompiledFamily(UsualStart):
             names += (
                 INTEGRAL if INTEGRAL[0] in plant.names and plant.value(INTEGRAL[0]) > 0.0 else ()
             )
-            names += ORIFICES if plant.air == "flow" else ()
+            names += (*ORIFICES, *self.volumes) if plant.air == "flow" else ()
         names = [name for name in names if name not in inert]
         names += [CLOCK] if self.lead else []
         names += [f"{WEIGHT}{k}]" for k in range(self.elements)]

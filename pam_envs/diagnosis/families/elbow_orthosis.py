@@ -72,6 +72,7 @@ class BoundElbow(RegulatedFamily):
         *("angle", "pressure_a", "pressure_b", "torque", "force_a", "force_b"),
     )
     settings: ClassVar[Mapping[str, Mapping[str, Any]]] = SETTINGS
+    volumes: ClassVar[tuple[str, ...]] = ("bundle_a.diameter", "bundle_b.diameter")
     pairs: ClassVar[Mapping[str, str]] = PAIRS
     law: ClassVar[str] = "muscle"
 

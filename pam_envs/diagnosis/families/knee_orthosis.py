@@ -84,6 +84,7 @@ class BoundKnee(RegulatedFamily):
 
     channels: ClassVar[tuple[str, ...]] = ("angle", "pressure", "tension", "torque")
     pairs: ClassVar[Mapping[str, str]] = {"set_point": "pressure"}
+    volumes: ClassVar[tuple[str, ...]] = ("muscle.full_volume",)
 
     @property
     def settings(self) -> Mapping[str, Mapping[str, Any]]:  # type: ignore[override]

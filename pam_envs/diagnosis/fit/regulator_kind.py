@@ -31,7 +31,6 @@ from pam_envs.diagnosis.fit.least_squares import (
     promising,
 )
 from pam_envs.diagnosis.fit.single_muscle import (
-    BORE,
     CLOCK,
     CONTROL,
     INTEGRAL,
@@ -397,9 +396,10 @@ def _size(fit: Fit) -> int:
 
 
 def regulator_of(family: Any) -> tuple[Free, ...]:
-    """Return the free parameters of the regulator and the clock."""
+    """Return the free parameters of the regulator, the volume behind it and the clock."""
     every = family.base()
-    return tuple(f for f in every if f.name.startswith("regulator.") or f.name in (BORE, CLOCK))
+    others = (*family.volumes, CLOCK)
+    return tuple(f for f in every if f.name.startswith("regulator.") or f.name in others)
 
 
 def second_orders(family: Any, frees: tuple[Free, ...]) -> list[tuple[Free, ...]]:

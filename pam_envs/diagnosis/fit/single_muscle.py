@@ -165,6 +165,7 @@ class MuscleFamily:
     fallback_noise = (5e-5, 1e3)
     scales = (1e-3, 1e5)
     units = ("mm", "bar")
+    volumes = (BORE,)
     orifices = ORIFICES
     conductances = CONDUCTANCES
 
