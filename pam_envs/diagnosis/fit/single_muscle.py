@@ -64,6 +64,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "regulator.critical_ratio": {"scale": 0.1, "prior": 3.0},
     "regulator.opening_band": {"log": True, "prior": 2.0},
     "regulator.opening_bend": {"scale": 0.2, "prior": 3.0},
+    "regulator.polytropic": {"scale": 0.05, "prior": 4.0},
     "regulator.source_pressure": {"log": True, "prior": 0.5},
     "regulator.opening_lag": {"log": True, "low": 2e-3, "high": 0.3, "prior": 2.0},
     "regulator.opening_integral": {"log": True, "low": 0.1, "high": 50.0, "prior": 2.0},
@@ -96,6 +97,7 @@ ORIFICES = {
     "regulator.critical_ratio": 0.3,
     "regulator.opening_band": 4e4,
     "regulator.opening_bend": 0.0,
+    "regulator.polytropic": 1.1,
     "regulator.source_pressure": 8e5,
 }
 """Parameters of a regulator with flow through its orifices, with their starting values."""

@@ -143,14 +143,14 @@ def valve_flow(
     spool: float,
     total: float,
     target: float,
-    strain: float,
-    moved: float,
+    volume: float,
+    grown: float,
     dt: float,
 ) -> tuple[float, float, float]:
     """Return pressure [bar], position of the spool and integral of the error [bar] after a step.
 
     A PI controller with anti-windup (Astrom and Hagglund 1995) moves the spool, which overlaps its
-    ports; the volume grows with the contraction.
+    ports. ``volume`` is that of the muscle over its volume at full length, ``grown`` its change.
     """
     error, span = max(c[3] * target + c[4], 0.0) - p, c[2] / c[0]
     error -= min(max(error, -OVERLAP * c[6]), OVERLAP * c[6])
@@ -159,13 +159,33 @@ def valve_flow(
     closed = error == 0.0 and c[6] > 0.0
     wish = 0.0 if closed else min(max((error + total) / span, -1.0), 1.0)
     spool += dt / c[8] * (wish - spool)
-    inside, volume = p + AIR, 1.0 + c[11] * strain
+    inside = p + AIR
     if spool > 0.0:
         flow = spool * c[2] * through(c[9], inside, c[12]) / c[9]
     else:
         flow = spool * c[2] * c[10] * through(inside, AIR, c[12]) / c[9]
-    p += (dt * flow - 1.2 * inside * c[11] * moved) / volume
+    p += (dt * flow - 1.2 * inside * grown) / volume
     return p, spool, total
+
+
+@njit(cache=True)
+def swelling(c: np.ndarray, strain: float) -> float:
+    """Return the growth of a muscle's volume by contraction, over that at full length.
+
+    By virtual work it goes with the force that a rise of the pressure gives (Chou and Hannaford
+    1996): otherwise a muscle that is shut in would do work in a cycle of its length.
+    """
+    given = polynomial(c, 2.5, strain) - polynomial(c, 1.5, strain)
+    return given / (polynomial(c, 2.5, 0.0) - polynomial(c, 1.5, 0.0))
+
+
+@njit(cache=True)
+def swollen(c: np.ndarray, widening: float, strain: float) -> float:
+    """Return the volume of a muscle over that at full length."""
+    total, parts = 0.0, 400
+    for i in range(parts):
+        total += swelling(c, strain * (i + 0.5) / parts)
+    return 1.0 + widening * strain * total / parts
 
 
 @njit(cache=True)
@@ -283,8 +303,11 @@ def run(
     q[:] = link[3]
     for k in range(m):
         strain[k] = place(kinds[3], geometry, k % sides, q[k // sides])[0]
+    volume = np.ones(m)
     if kinds[2] == 2:
         held[:] = 0.0  # here the integral of the controller's error
+        for k in range(m):
+            volume[k] = swollen(muscles[k], valve[11], strain[k])
     settle = int(20.0 / dt)  # reaches rest before the first row
     late = round(valve[5] / dt)
     for step in range(-settle, rows * sub):
@@ -298,8 +321,10 @@ def run(
             e, rate = place(kinds[3], geometry, k % sides, q[k // sides])
             aim = commands[k, then]
             if kinds[2] == 2:
+                grown = valve[11] * swelling(c, 0.5 * (e + strain[k])) * (e - strain[k])
+                volume[k] += grown
                 p[k], speed[k], held[k] = valve_flow(
-                    valve, p[k], speed[k], held[k], aim, e, e - strain[k], dt
+                    valve, p[k], speed[k], held[k], aim, volume[k], grown, dt
                 )
             else:
                 p[k], speed[k], held[k] = regulate(

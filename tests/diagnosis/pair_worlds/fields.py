@@ -37,7 +37,7 @@ VALVE = (
     "spool_s",  # lag of the spool [s]
     "supply",  # absolute [bar]
     "vent",  # conductance of the exhaust over that of the supply
-    "widening",  # of the volume by the contraction
+    "widening",  # of the volume by the contraction, at full length
     "choke",  # critical ratio of pressures
 )
 """The last six belong to the orifice."""
