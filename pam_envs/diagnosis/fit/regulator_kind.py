@@ -329,20 +329,18 @@ class Selection:
         return of.with_control(of.simplest(promising(of.only, fits), LONG_ROUNDS))
 
     def with_control(self, fit: Fit) -> Made:
-        """Return the orifices and a fit, with a lag of the opening or an integral part if needed.
+        """Return the orifices and a fit, with a lag of the opening and an integral part if needed.
 
-        One that the plant already has is kept.
+        Both come together, since a lag of some milliseconds shows only when the motion fits too.
+        What the plant already has is kept.
         """
         if not self.lacks(fit) or CONTROL & set(stages_of(self.family.plant)):
             return self.family, fit
         begin = start_at_guess(fit.frees, fit.values())
-        column = column_of(fit, fit.z)
-        fits = [fit]
-        for openings in ((OPENINGS[0],), (OPENINGS[1],), OPENINGS):
-            values = {n: v for opening in openings for n, v in opening.items()}
-            further = (self.family.free(n, start=v) for n, v in values.items())
-            fits.append(Fit.at_start((*begin, *further), column))
-        made = self.simplest(fits, LONG_ROUNDS)
+        values = {name: value for opening in OPENINGS for name, value in opening.items()}
+        further = (self.family.free(name, start=value) for name, value in values.items())
+        more = Fit.at_start((*begin, *further), column_of(fit, fit.z))
+        made = self.simplest([fit, more], LONG_ROUNDS)
         return with_values(self.family, made, CONTROL), made
 
     def of(self, family: Any) -> "Selection":
