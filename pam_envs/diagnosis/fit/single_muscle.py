@@ -97,7 +97,7 @@ ORIFICES = {
     "regulator.critical_ratio": 0.3,
     "regulator.opening_band": 4e4,
     "regulator.opening_bend": 0.0,
-    "regulator.polytropic": 1.1,
+    "regulator.polytropic": 1.2,
     "regulator.source_pressure": 8e5,
 }
 """Parameters of a regulator with flow through its orifices, with their starting values."""
