@@ -126,22 +126,30 @@ def test_only_muscles_in_pairs_have_a_fault_among_their_common_differences():
 
 
 @needs_kernels
-@pytest.mark.parametrize("flow", [0.0, 1.0])
-def test_regulator_of_the_base_is_of_the_kind_that_the_pressure_shows(flow):
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        {"regulator__flow": 1.0},
+        {
+            **{"regulator__flow": 1.0, "regulator__opening_integral": 3.0},
+            **{"regulator__opening_windup": 0.2, "regulator__opening_lag": 0.02},
+        },
+    ],
+)
+def test_regulator_of_the_base_is_of_the_kind_that_the_pressure_shows(values):
     rig, kind = family_rigs.KNEE, kind_named("knee_orthosis")
-    recording, sheet = rig.recorded(regulator__flow=flow), rig.sheet
+    recording, sheet = rig.recorded(**values), rig.sheet
     floor = noise_floor(recording, sheet)
     study = Study.begin(recording, sheet, kind.start(sheet), floor, kind)
-    assert study.family.plant.air == ("flow" if flow else "regulator")
+    assert study.family.plant.air == ("flow" if values else "regulator")
     left = study.blocks.means(study.base.errors)
     assert left[study.family.channels.index("pressure")] < 1.1
-    found, true = study.plant_of(study.base).regulator, rig.truth(regulator__flow=flow).regulator
-    if flow:
-        assert found.conductance == pytest.approx(true.conductance, rel=0.02)
-        assert found.exhaust_share == pytest.approx(true.exhaust_share, rel=0.02)
-        assert found.source_pressure == pytest.approx(true.source_pressure, rel=0.02)
-    else:
-        assert found.time_constant == pytest.approx(true.time_constant, rel=0.05)
+    plants = study.plant_of(study.base), rig.truth(**values)
+    found, true = (dataclasses.asdict(plant.regulator) for plant in plants)
+    names = {0: ["time_constant"], 1: ["exhaust_share", "source_pressure"]}
+    for name in names.get(len(values), ["opening_integral", "opening_windup", "opening_lag"]):
+        assert found[name] == pytest.approx(true[name], rel=0.05), name
 
 
 @pytest.mark.parametrize("name", KINDS)
