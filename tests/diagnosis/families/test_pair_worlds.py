@@ -144,15 +144,29 @@ def test_orifice_flow_chokes_at_low_back_pressure_and_is_antisymmetric():
 def test_proportional_valve_reaches_its_setpoint_within_its_gain_error(seed, ends):
     """At constant volume a step of 1 bar reaches 63 % in 0.03 to 0.2 s, without dead time."""
     c, dt = rigs._valve(engine.ORIFICE, np.random.default_rng(seed), {}), 5e-4
-    p, spool, total = ends[0], 0.0, 0.0
+    p, spool, total, volume = ends[0], 0.0, 0.0, 1.0 + 0.1 * c[fields.VALVE.index("widening")]
     found = []
     for _ in range(20_000):
-        p, spool, total = engine.valve_flow(c, p, spool, total, ends[1], 0.1, 0.0, dt)
+        p, spool, total = engine.valve_flow(c, p, spool, total, ends[1], volume, 0.0, dt)
         found.append(p)
     assert found[-1] == pytest.approx(c[3] * ends[1], abs=1e-3)
     part = (np.array(found) - ends[0]) / (ends[1] - ends[0])
     assert 0.03 < dt * np.argmax(part > 0.632) < 0.2
     assert part.max() < 1.1
+
+
+@pytest.mark.parametrize("seed", range(700_000, 700_005))
+def test_cycle_of_pressure_and_length_does_the_work_of_its_air(seed):
+    """The area of the cycle in force and length is in proportion to that in pressure and volume."""
+    family, random = rigs.FAMILIES["antagonistic_joint"], np.random.default_rng(seed)
+    c = rigs._muscles(family, random, {}, engine.POLYNOMIAL)[0]
+    over = []
+    for low, high in ((-0.05, 0.02), (0.02, 0.08), (0.08, 0.15)):
+        middles = low + (high - low) * (np.arange(200) + 0.5) / 200
+        given = [engine.polynomial(c, 2.5, e) - engine.polynomial(c, 1.5, e) for e in middles]
+        grown = engine.swollen(c, 2.0, high) - engine.swollen(c, 2.0, low)
+        over.append((high - low) * np.mean(given) / grown)
+    assert over == pytest.approx([over[0]] * 3, rel=1e-3)
 
 
 def test_set_valued_friction_stops_a_joint_and_never_reverses_it():
