@@ -294,9 +294,6 @@ class CompiledFamily(UsualStart):
         names = [n for n in self.settings if not (self.measured_drive and in_valve(n))]
         if not self.measured_drive:
             names += stages_of(plant)
-            names += (
-                INTEGRAL if INTEGRAL[0] in plant.names and plant.value(INTEGRAL[0]) > 0.0 else ()
-            )
             names += (*ORIFICES, *self.volumes) if plant.air == "flow" else ()
         names = [name for name in names if name not in inert]
         names += [CLOCK] if self.lead else []

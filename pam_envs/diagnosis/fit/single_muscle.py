@@ -129,8 +129,9 @@ USUAL_ROWS = 2.5
 
 
 def stages_of(plant: Any) -> list[str]:
-    """Return the parameters of second orders and of openings that the regulator of a plant has."""
-    on = [s for s in (*SECOND_ORDER, *OPENINGS) if plant.value(next(iter(s))) > 0.0]
+    """Return parameters of the second order, integral part and opening that a plant's valve has."""
+    stages = (*SECOND_ORDER, INTEGRAL, *OPENINGS)
+    on = [stage for stage in stages if plant.value(next(iter(stage))) > 0.0]
     return [name for stage in on for name in stage if name not in plant.inert]
 
 
@@ -283,7 +284,6 @@ class MuscleFamily:
         names = [name for name in BASE if not (flows and name == LAG)]
         names += [*((*ORIFICES, BORE) if flows else ()), *((CLOCK,) if self.clock > 0.0 else ())]
         names += stages_of(self.plant)
-        names += [name for name in INTEGRAL if self.plant.regulator.integral > 0.0]
         names += [f"hysteresis.weight[{k}]" for k in range(self.plant.elements)]
         present = [
             name
